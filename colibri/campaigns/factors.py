@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.random import Generator
@@ -23,19 +23,7 @@ class CampaignError(Error):
     """A campaign is invalid; the message names the key."""
 
 
-class Draw(Protocol):
-    """A distribution; `value` is reproducible on every computer."""
-
-    def value(self, chance: Generator) -> Any: ...
-
-    @property
-    def typical(self) -> tuple[Any, ...]:
-        """Values to test a factor with: the ends of a range, or mean ± one deviation."""
-
-
 class Uniform(NamedTuple):
-    """Uniform between `low` and `high`."""
-
     low: float
     high: float
 
@@ -88,6 +76,8 @@ class Choice(NamedTuple):
         return self.values
 
 
+Draw: TypeAlias = Uniform | LogUniform | Normal | Choice
+"""A distribution, reproducible on every computer; `typical` values test a factor: the ends, or mean ± one deviation."""
 _PAIRS: dict[str, Any] = {"uniform": Uniform, "log-uniform": LogUniform, "normal": Normal}
 _PLAIN = (str, int, float, Mapping, list, tuple)
 _DISTRIBUTIONS = (*_PAIRS, "choice")
@@ -179,9 +169,8 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
         raise CampaignError(f"{key}: {name}: expected [first, last, how many], not {span}")
     first, last, count = float(span[0]), float(span[1]), float(span[2])
     if not count.is_integer() or not 2 <= count <= _MAX_SPAN or first == last:
-        raise CampaignError(
-            f"{key}: {first:g}:{last:g}:{count:g} is not a range: give FIRST:LAST:COUNT, for example 2:20:10"
-        )
+        given = f"{first:g}:{last:g}:{count:g}"
+        raise CampaignError(f"{key}: {given} is not a range: give FIRST:LAST:COUNT, for example 2:20:10")
     if name == "linspace":
         return tuple(np.linspace(first, last, int(count)).tolist())
     if first <= 0.0 or last <= 0.0:

@@ -109,14 +109,8 @@ def _travelling(campaign: Campaign) -> dict[str, tuple[str, Any]]:
     """Return the laws of files by their places; pickle modules by value, if they belong to no installed package."""
     places = filter(is_place, _names(campaign, "controller"))
     laws = {place: (current_name(place), load_controller(place)) for place in places}
-    functions = [metric.of for metric in campaign.metrics]
-    objects = [
-        *functions,
-        *campaign.values("controller"),
-        *campaign.values("track"),
-        *(law for _, law in laws.values()),
-    ]
-    for each in objects:
+    given = (*(metric.of for metric in campaign.metrics), *campaign.values("controller"), *campaign.values("track"))
+    for each in (*given, *(law for _, law in laws.values())):
         module = modules.get(getattr(each, "__module__", None) or "")
         file = getattr(module, "__file__", None)
         if module is not None and file and not {"site-packages", "colibri"} & {*Path(file).parts}:

@@ -1,7 +1,7 @@
 """`colibri.campaign`: fly a campaign."""
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from numbers import Integral
 from pathlib import Path, PurePath
 from types import NoneType
@@ -11,8 +11,8 @@ from warnings import warn
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.engines.pool import Engine, Pool
 from colibri.campaigns.factors import CampaignError
-from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points
-from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
+from colibri.campaigns.flights import FlightResult, check, common_of, fly_points
+from colibri.campaigns.journal import JOURNAL, open_journal, read_journal
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.common.errors import checked
 from colibri.common.process.folder_lock import FolderLock
@@ -92,35 +92,20 @@ def fly_campaign(
         parquet_writer()
     common = common_of(planned, remote=engine.is_remote)
     notes = check(planned.samples(), common, ignored=("seed",) if planned.draw else ())
-    if out is None:
-        return _fly(planned, common, engine, None, progress, notes, kind)
-    try:
-        lock = FolderLock(out, "--out")
-    except OSError as error:
-        raise CampaignError(f"cannot write to --out {out}: {error.strerror}") from error
-    with closing(lock), open_journal(out, planned, common, resume=resume) as journal:
-        begun(len(journal.kept))
-        try:
-            return _fly(planned, common, engine, journal, progress, notes, kind)
-        finally:
-            kept = {each.flight: each for each in read_journal(out / JOURNAL)}
-            kind(planned, kept).save(out, parquet=parquet)
-
-
-def _fly(
-    planned: Campaign,
-    common: Common,
-    engine: Engine,
-    journal: Journal | None,
-    progress: Callable[[FlightResult], object],
-    notes: Sequence[str],
-    kind: type[CampaignResults],
-) -> CampaignResults:
-    flown: dict[int, FlightResult] = {} if journal is None else journal.kept
-    done = frozenset(flown)
-    left = (point for point in planned.points() if point.flight not in done)
-    with closing(fly_points(left, common, engine)) as ended:
-        for each in ended:
+    with ExitStack() as held:
+        journal = None
+        if out is not None:
+            try:
+                held.enter_context(closing(FolderLock(out, "--out")))
+            except OSError as error:
+                raise CampaignError(f"cannot write to --out {out}: {error.strerror}") from error
+            journal = held.enter_context(open_journal(out, planned, common, resume=resume))
+            held.callback(_save, kind, planned, out, parquet=parquet)
+            begun(len(journal.kept))
+        flown: dict[int, FlightResult] = {} if journal is None else journal.kept
+        done = frozenset(flown)
+        left = (point for point in planned.points() if point.flight not in done)
+        for each in held.enter_context(closing(fly_points(left, common, engine))):
             if journal is None:
                 flown[each.flight] = each
             else:
@@ -130,3 +115,7 @@ def _fly(
     if factors := results.without_effect():
         results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ only in these are identical)")
     return results
+
+
+def _save(kind: type[CampaignResults], planned: Campaign, out: Path, *, parquet: bool) -> None:
+    kind(planned, {each.flight: each for each in read_journal(out / JOURNAL)}).save(out, parquet=parquet)
