@@ -95,7 +95,8 @@ def _check(spec: FleetSpec) -> str:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
     if not 1 <= spec.count <= MAX_FLEET - spec.instance:
         fail(f"--instance and --count: at least one vehicle, instances from 0 to {MAX_FLEET - 1}")
-    if spec.count > 1 and any(_taken_by_one(url) for url in spec.gcs):
+    listening = (url for url in spec.gcs if url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0"))
+    if spec.count > 1 and (any(listening) or any(url.startswith("serial:") for url in spec.gcs)):
         fail("--gcs: several vehicles cannot have one port; let them call, by udpout: or tcp:, or fly one")
     try:
         for instance in range(spec.instance, spec.instance + spec.count):
@@ -103,10 +104,6 @@ def _check(spec: FleetSpec) -> str:
     except LinkError as error:
         fail(str(error))
     return in_words(without_effect(FlownOptions(spec, name, assumed, vehicle, whole)).items())
-
-
-def _taken_by_one(url: str) -> bool:
-    return url.startswith("serial:") or (url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0"))
 
 
 def _plant_url(spec: FleetSpec, instance: int) -> str:
@@ -126,42 +123,26 @@ def place_of(member: Member, spec: FleetSpec) -> HomePlace:
 
 def _start_plant(member: Member, spec: FleetSpec) -> None:
     member.boot_unix_us = round(time() * 1e6)
-    home = place_of(member, spec)
-    plant = part_of(
-        spec,
-        PlantSpec,
-        link=_plant_url(spec, member.instance),
-        vehicle=spec.plant_vehicle or spec.vehicle or load_profile(spec.profile).simulation.vehicle,
-        start=spec.started(Start(psi=home.yaw_enu_deg))._asdict(),
-        seed=spec.seed + member.instance,
-        tlog=True,
-        events=plant_events(spec.events),
-        **_common(member, spec),
-    )
-    member.children.append(Child(plant))
+    start = spec.started(Start(psi=place_of(member, spec).yaw_enu_deg))
+    own = {
+        "link": _plant_url(spec, member.instance),
+        "vehicle": spec.plant_vehicle or spec.vehicle or load_profile(spec.profile).simulation.vehicle,
+        "start": start._asdict(),
+        "seed": spec.seed + member.instance,
+        "events": plant_events(spec.events),
+    }
+    _start(PlantSpec, member, spec, own)
 
 
 def _start_autopilot(member: Member, spec: FleetSpec) -> None:
-    autopilot = part_of(
-        spec,
-        AutopilotSpec,
-        plant=member.plant_url.replace("udpin", "udpout"),
-        gcs=tuple(member.links),
-        tlog=True,
-        state=spec.state / str(member.instance),
-        events=station_events(spec.events),
-        **_common(member, spec),
-    )
-    member.children.append(Child(autopilot))
+    plant, state = member.plant_url.replace("udpin", "udpout"), spec.state / str(member.instance)
+    own = {"plant": plant, "gcs": tuple(member.links), "state": state, "events": station_events(spec.events)}
+    _start(AutopilotSpec, member, spec, own)
 
 
-def _common(member: Member, spec: FleetSpec) -> dict[str, Any]:
-    return {
-        "home": place_of(member, spec),
-        "system_id": member.system_id,
-        "boot_unix_us": member.boot_unix_us,
-        "out": spec.folder(member.instance),
-    }
+def _start(kind: type[PlantSpec | AutopilotSpec], member: Member, spec: FleetSpec, own: dict[str, Any]) -> None:
+    own |= {"home": place_of(member, spec), "system_id": member.system_id, "boot_unix_us": member.boot_unix_us}
+    member.children.append(Child(part_of(spec, kind, **own, out=spec.folder(member.instance), tlog=True)))
 
 
 def _watch(fleet: Sequence[Member], spec: FleetSpec, stop: Stop, lines: StatusLines) -> None:

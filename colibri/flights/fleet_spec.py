@@ -16,21 +16,11 @@ PLANT_PORT = 14560
 GROUND_PORT = 14550
 SDK_PORT = 14540
 TCP_PORT = 5760
-LINKS = {
-    "px4": ("udpout:127.0.0.1:{ground}", "udpout:127.0.0.1:{sdk}"),
-    "generic": ("udpout:127.0.0.1:{ground}", "udpout:127.0.0.1:{sdk}"),
-    "ardupilot": ("udpout:127.0.0.1:{ground}", "tcpin:127.0.0.1:{tcp}"),
-}
-"""Links of each identity."""
-
-
-CONNECT = {
-    "ardupilot": (
-        "connect: mavproxy.py --master=tcp:127.0.0.1:{tcp}; Mission Planner: TCP, 127.0.0.1, {tcp}; "
-        'dronekit.connect("tcp:127.0.0.1:{tcp}", wait_ready=True); QGroundControl by itself (UDP {ground})'
-    )
-}
-"""Line that says how clients connect, for identities whose clients must be told."""
+_CONNECT = (
+    "connect: mavproxy.py --master=tcp:127.0.0.1:{tcp}; Mission Planner: TCP, 127.0.0.1, {tcp}; "
+    'dronekit.connect("tcp:127.0.0.1:{tcp}", wait_ready=True); QGroundControl by itself (UDP {ground})'
+)
+"""How clients of ArduPilot connect; those of PX4 do by themselves."""
 
 
 def ports(instance: int) -> dict[str, int]:
@@ -70,7 +60,9 @@ class FleetSpec(VehiclesSpec, GroundSpec):
 
     def connect(self) -> str:
         """Return how clients connect; empty for links of the user's own, or where they do by themselves."""
-        return "" if self.gcs else CONNECT.get(self.identity, "").format(**ports(self.instance))
+        told = self.identity == "ardupilot" and not self.gcs
+        return _CONNECT.format(**ports(self.instance)) if told else ""
 
     def links(self, instance: int) -> list[str]:
-        return list(self.gcs) or [link.format(**ports(instance)) for link in LINKS[self.identity]]
+        sdk = "tcpin:127.0.0.1:{tcp}" if self.identity == "ardupilot" else "udpout:127.0.0.1:{sdk}"
+        return list(self.gcs) or [link.format(**ports(instance)) for link in ("udpout:127.0.0.1:{ground}", sdk)]

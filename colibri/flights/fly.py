@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from colibri.common.errors import InFlightError, checked
 from colibri.common.process.failure_file import keep_failure
-from colibri.common.process.lifecycle import EXIT_FAILED, loading
+from colibri.common.process.lifecycle import loading
 from colibri.flights.plan import FlightPlan, FrameCount, PlanError, unseen
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.flights.provenance import write_provenance
@@ -42,4 +42,4 @@ def fly_plan(
         return fly_locally(plan, progress, topics)
     except InFlightError as error:
         folder = plan.out if topics is None else None
-        raise FlightError(keep_failure(error, folder), EXIT_FAILED, said=False) from error
+        raise FlightError(keep_failure(error, folder)) from error

@@ -11,7 +11,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from multiprocessing import current_process, get_context
 from multiprocessing.process import BaseProcess
@@ -175,7 +175,7 @@ def how_it_ended(code: int) -> str:
 
 def end_children(children: Iterable[Child]) -> None:
     """Terminate children; kill those still alive after the grace period."""
-    several: Sequence[Child] = list(children)
+    several = list(children)
     for child in several:
         child.terminate()
     for child in several:

@@ -18,7 +18,6 @@ from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
 from colibri.flights.effects import FlownOptions, without_effect
 from colibri.flights.spec import FlightSpec
-from colibri.mavlink.client.events import StationEvent
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
 from colibri.plant.events import check_events, plant_events
@@ -68,12 +67,6 @@ class Contents(NamedTuple):
     whole: Vehicle | None = None
 
 
-def contents_of(spec: FlightSpec) -> Contents:
-    profile, vehicle = spec.load()
-    whole = load_vehicle(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
-    return Contents(profile, vehicle, whole.without(spec.without), file_text(spec.track), whole)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPlan:
     """A flight that can begin.
@@ -106,7 +99,10 @@ class FlightPlan:
         if spec.gcs and spec.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {spec.link} no autopilot process runs")
         check_reach(spec.gcs, signed=spec.signing_key is not None, insecure=spec.insecure)
-        contents = contents or contents_of(spec)
+        if contents is None:
+            profile, vehicle = spec.load()
+            whole = load_vehicle(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
+            contents = Contents(profile, vehicle, whole.without(spec.without), file_text(spec.track), whole)
         profile, vehicle, plant_vehicle, track_file, _ = contents
         if spec.params:
             from colibri.autopilot.parameters.chosen import with_parameters  # slow to load
@@ -116,14 +112,19 @@ class FlightPlan:
                 profile, vehicle = chosen
                 contents = contents._replace(profile=profile, vehicle=vehicle)
         names = _names(spec, profile)
-        if spec.feedback is Feedback.SENSORS:
-            for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
-                _check_sensors(name, each)
+        on_sensors = spec.feedback is Feedback.SENSORS
+        for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
+            if on_sensors and each.sensors is None:
+                raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
+            if on_sensors and each.ground is None:
+                why = "has no ground to stand on until the estimate is valid"
+                raise PlanError(f"--feedback sensors: vehicle {name} {why}")
         _check_order(vehicle, plant_vehicle)
         floor_m = _floor_m(spec, plant_vehicle)
         served = bool(spec.gcs) or contents.whole is None  # stations of a recorded flight are not kept
-        check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS, served=served)
-        _sent(spec)
+        check_events(spec.events, plant_vehicle, on_sensors=on_sensors, served=served)
+        if spec.gcs:
+            station_events(spec.events)
         track, note = _loaded(spec.track, vehicle, profile, floor_m, track_file)
         start = spec.started(_usual_start(profile, plant_vehicle, track, spec.feedback))
         try:
@@ -192,32 +193,16 @@ class FlightPlan:
 
     def plant_spec(self, link: str) -> PlantSpec:
         """Return the specification of the plant, which listens at a link."""
-        spec = self.spec
+        spec, tlog = self.spec, self.spec.tlog or bool(self.spec.gcs)
         vehicle = spec.plant_vehicle or spec.vehicle or self.profile.simulation.vehicle
-        return part_of(
-            spec,
-            PlantSpec,
-            link=link,
-            vehicle=vehicle,
-            integrator=self.integrator,
-            start=self.start._asdict(),
-            speed=spec.pace,
-            tlog=spec.tlog or bool(spec.gcs),
-            events=plant_events(spec.events),
-        )
+        given = {"integrator": self.integrator, "start": self.start._asdict(), "events": plant_events(spec.events)}
+        return part_of(spec, PlantSpec, link=link, vehicle=vehicle, speed=spec.pace, tlog=tlog, **given)
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
         """Return the specification of the autopilot, which calls the plant."""
-        tlog = self.spec.tlog or bool(self.spec.gcs)
-        given = {"params": dict(self.spec.params), "events": _sent(self.spec)}
-        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog, **given)
-
-
-def _sent(spec: FlightSpec) -> tuple[StationEvent, ...]:
-    if not spec.gcs:
-        return ()
-
-    return station_events(spec.events)
+        spec, tlog = self.spec, self.spec.tlog or bool(self.spec.gcs)
+        given = {"params": dict(spec.params), "events": station_events(spec.events) if spec.gcs else ()}
+        return part_of(spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog, **given)
 
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
@@ -241,13 +226,6 @@ def _check_order(vehicle: Vehicle, plant_vehicle: Vehicle) -> None:
 
 def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:
     return spec.floor if spec.floor is not None else -inf if plant_vehicle.ground is None else 0.0
-
-
-def _check_sensors(name: str, vehicle: Vehicle) -> None:
-    if vehicle.sensors is None:
-        raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
-    if vehicle.ground is None:
-        raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on until the estimate is valid")
 
 
 def _usual_start(profile: Profile, vehicle: Vehicle, flown: Track, feedback: Feedback) -> Start:

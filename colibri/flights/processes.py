@@ -19,10 +19,9 @@ _BY_SIGNAL = 128
 class FlightError(InFlightError):
     """A process ended before its flight did; `said` if it has printed the reason."""
 
-    def __init__(self, message: str, code: int, *, said: bool) -> None:
+    def __init__(self, message: str, code: int = EXIT_FAILED, *, said: bool = False) -> None:
         super().__init__(message)
-        self.code = code
-        self.said = said
+        self.code, self.said = code, said
 
 
 def fly_processes(
@@ -64,9 +63,9 @@ def fly_processes(
             held = [child.name for child in children.values() if child.is_stopped()]
             (stopped.begin if held else stopped.end)()
             if stopped.is_over():
-                raise FlightError(f"the {held[0]} was stopped for {_STOPPED_S:.0f} s", EXIT_FAILED, said=False)
+                raise FlightError(f"the {held[0]} was stopped for {_STOPPED_S:.0f} s")
             if silent.is_over() and not held:
-                raise FlightError(f"the autopilot did not answer for {_SILENT_S:.0f} s", EXIT_FAILED, said=False)
+                raise FlightError(f"the autopilot did not answer for {_SILENT_S:.0f} s")
         if summary and children["plant"].code() == 0:
             return summary
         raise _failure(children.values(), plan)
@@ -103,4 +102,4 @@ def _failure(children: Iterable[Child], plan: FlightPlan) -> FlightError:
             said = 0 < code < _BY_SIGNAL
             why = kept_failure(plan.out) or f"the {child.name} {how_it_ended(code)}"
             return FlightError(why, code if said else EXIT_FAILED, said=said)
-    return FlightError("a process ended before the flight did", EXIT_FAILED, said=False)
+    return FlightError("a process ended before the flight did")

@@ -23,7 +23,7 @@ from colibri.autopilot.process.recorded_inputs import InputsError, RecordedInput
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
 from colibri.common.files import read_bytes
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.common.rotations import earth_from_body, euler_from_quaternion
 from colibri.common.serialization import of_bytes
 from colibri.mavlink.hil.feedback import Feedback
@@ -60,14 +60,9 @@ class Difference(NamedTuple):
     known: StateFrame | None
 
     def __str__(self) -> str:
-        return "\n".join(
-            (
-                f"first difference at t = {self.recorded.time_us * 1e-6:.3f} s, in mode {self.mode}",
-                f"  recorded: {_rotors(self.recorded)}",
-                f"  replayed: {_rotors(self.replayed)}",
-                f"  vehicle:  {_state(self.known)}",
-            )
-        )
+        where = f"first difference at t = {self.recorded.time_us * 1e-6:.3f} s, in mode {self.mode}"
+        commands = f"  recorded: {_rotors(self.recorded)}\n  replayed: {_rotors(self.replayed)}"
+        return f"{where}\n{commands}\n  vehicle:  {_state(self.known)}"
 
 
 class Replayed(NamedTuple):
@@ -83,13 +78,10 @@ class ReplayError(Error):
 
 
 def replay(args: argparse.Namespace) -> int:
-    log = args.log / FILE if args.log.is_dir() else args.log
-    try:
-        flight = _read(log)
+    with one_line():
+        flight = _read(args.log)
         outcome = _compare(flight)
-    except ReplayError as error:
-        fail(str(error))
-    ended_us = _ended_us(flight)
+    log, ended_us = flight.path, _ended_us(flight)
     if outcome.difference is not None:
         print(outcome.difference)  # noqa: T201
         fail(f"{log}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
@@ -113,11 +105,13 @@ def answers_of(path: Path) -> Iterator[Answer]:
 
 
 class _Flight(NamedTuple):
-    """A recorded flight."""
-
     path: Path
     log: FlightFile
     inputs: RecordedInputs
+
+    @property
+    def setup(self) -> Setup:
+        return next(iter(self.inputs.setups.values()))
 
 
 def _read(path: Path) -> _Flight:
@@ -133,13 +127,12 @@ def _read(path: Path) -> _Flight:
     except InputsError as error:
         raise ReplayError(f"{path}: {error}") from error
     if next(_recorded(flight), None) is None:
-        (setup, *_) = flight.inputs.setups.values()
-        raise ReplayError(f"{path}: no frame of {setup.feedback} feedback was answered: nothing to replay")
+        raise ReplayError(f"{path}: no frame of {flight.setup.feedback} feedback was answered: nothing to replay")
     return flight
 
 
 def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
-    (setup, *_) = flight.inputs.setups.values()
+    setup = flight.setup
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
     true: StateFrame | None = None
@@ -174,8 +167,7 @@ def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:
 
 
 def _compare(flight: _Flight) -> Replayed:
-    (setup, *_) = flight.inputs.setups.values()
-    codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
+    codec = Codec(flight.setup.system_id, dialect.AUTOPILOT_COMPONENT)
     commands = last_us = 0
     try:
         for answer in _answers(flight):
@@ -205,10 +197,8 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
                 now_s=_NO_CLOCK_S,
                 feedback=setup.feedback,
             )
-        if autopilot is None:
-            continue
-        received = end.receive(datagram, _NO_CLOCK_S)
-        if received is None:
+        received = None if autopilot is None else end.receive(datagram, _NO_CLOCK_S)
+        if autopilot is None or received is None:
             continue
         frame = received.frame
         try:

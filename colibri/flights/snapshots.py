@@ -14,7 +14,7 @@ from enum import Enum
 from gc import get_referents
 from operator import attrgetter, itemgetter
 from random import Random
-from types import BuiltinMethodType, CellType, FunctionType, MethodType, ModuleType
+from types import BuiltinMethodType, CellType, FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any, TypeAlias
 
 import msgspec
@@ -69,33 +69,15 @@ def _follow(each: Any) -> Kept:
     return None, get_referents(each)
 
 
-def _sequence(each: Any) -> Kept:
-    kept = each[:]
-
-    def restore() -> None:
-        each[:] = kept
-
-    return restore, kept if isinstance(each, list) else ()
-
-
-def _updated(each: Any) -> Kept:
+def _container(each: Any) -> Kept:
     kept = each.copy()
+    refill = each.update if hasattr(each, "update") else each.extend
 
     def restore() -> None:
         each.clear()
-        each.update(kept)
+        refill(kept)
 
     return restore, get_referents(each)
-
-
-def _deque(each: deque[Any]) -> Kept:
-    kept = list(each)
-
-    def restore() -> None:
-        each.clear()
-        each.extend(kept)
-
-    return restore, kept
 
 
 def _array(each: Any) -> Kept:
@@ -180,12 +162,8 @@ def _all(keeps: list[Keep]) -> Keep:
 
 _SHARED = (int, float, complex, str, bytes, type(None), type, Enum, ModuleType, range, slice, itemgetter, attrgetter)
 _FOLLOWED = (tuple, frozenset, MethodType, BuiltinMethodType)
-_CHANGING: tuple[tuple[type, Keep], ...] = (
-    (list, _sequence),
-    (bytearray, _sequence),
-    (dict, _updated),
-    (set, _updated),
-    (deque, _deque),
+_CHANGING: tuple[tuple[Any, Keep], ...] = (
+    ((list, bytearray, dict, set, deque), _container),
     (np.ndarray, _array),
     (np.random.Generator, _generator),
     (Random, _random),
@@ -193,18 +171,8 @@ _CHANGING: tuple[tuple[type, Keep], ...] = (
     (FunctionType, _function),
 )
 _STATELESS_PACKAGES = (
-    "numba",
-    "_nrt_python",
-    "onnxruntime",
-    "llvmlite",
-    "msgspec",
-    "re",
-    "_struct",
-    "ctypes",
-    "_ctypes",
-    "weakref",
-    "numpy",
-    "_thread",
+    *("numba", "_nrt_python", "onnxruntime", "llvmlite", "msgspec", "re"),
+    *("_struct", "ctypes", "_ctypes", "weakref", "numpy", "_thread"),
 )
 _HEAP_TYPE = 1 << 9
 """Flag of a class written in Python."""
@@ -218,12 +186,12 @@ def _kind(cls: type) -> Keep:
         return _follow
     if issubclass(cls, msgspec.Struct):
         return _follow if cls.__struct_config__.frozen else _slots(list(cls.__struct_fields__))
-    if is_dataclass(cls) and cls.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+    frozen = is_dataclass(cls) and cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    if frozen or issubclass(cls, np.void):  # a record within an array
         return _follow
     keeps = [keep for base, keep in _CHANGING if issubclass(cls, base)]
-    if issubclass(cls, np.void):  # a record within an array
-        return _follow
-    if cls.__flags__ & _HEAP_TYPE and cls.__module__.partition(".")[0] not in _STATELESS_PACKAGES:
+    is_stateless = cls.__module__.partition(".")[0] in _STATELESS_PACKAGES
+    if cls.__flags__ & _HEAP_TYPE and not is_stateless:
         names = [name for base in cls.__mro__ for name in _slot_names(base)]
         if names:
             keeps.append(_slots(names))
@@ -232,11 +200,10 @@ def _kind(cls: type) -> Keep:
         return keeps[0] if len(keeps) == 1 else _all(keeps)
     if keeps:
         return keeps[0]
-    if cls.__module__.partition(".")[0] in _STATELESS_PACKAGES or cls.__name__ in (
-        "_lru_cache_wrapper",
-        "mappingproxy",
-    ):
-        return _follow if cls.__name__ == "mappingproxy" else _share
+    if cls is MappingProxyType:
+        return _follow
+    if is_stateless or cls.__name__ == "_lru_cache_wrapper":
+        return _share
     raise SnapshotError(f"the state of a {cls.__module__}.{cls.__qualname__} cannot be kept")
 
 
