@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from colibri.autopilot.control.parts import policy_interface
+from colibri.autopilot.control.parts.policy_interface import MAX_POSITION_M, MAX_RATE_RAD_S, MAX_SPEED_M_S
 from colibri.common.errors import shown, unknown
 from colibri.gym.episodes import PILOTED, Episodes, EpisodesSnapshot
 from colibri.gym.errors import GymError
@@ -192,16 +192,8 @@ def _seed(given: Any) -> int | None:
 
 
 def _spaces(episodes: Episodes) -> tuple[Space[Values], Space[Values]]:
-    most = np.concatenate(
-        [
-            np.full(3, policy_interface.MAX_POSITION_M),
-            np.full(3, policy_interface.MAX_SPEED_M_S),
-            np.ones(9),
-            np.full(3, policy_interface.MAX_RATE_RAD_S),
-            np.ones(episodes.size),
-            np.full(3 * episodes.preview, policy_interface.MAX_POSITION_M),
-            np.ones(episodes.size * (episodes.history - 1)),
-        ]
-    ).astype(np.float32)
+    state = (*[MAX_POSITION_M] * 3, *[MAX_SPEED_M_S] * 3, *[1.0] * 9, *[MAX_RATE_RAD_S] * 3, *[1.0] * episodes.size)
+    beyond = [*[MAX_POSITION_M] * 3 * episodes.preview, *[1.0] * episodes.size * (episodes.history - 1)]
+    most = np.array([*state, *beyond], dtype=np.float32)
     spaces: Any = (Box(-most, most, dtype=np.float32), Box(-1.0, 1.0, (episodes.size,), dtype=np.float32))
     return spaces[0], spaces[1]

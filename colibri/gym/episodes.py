@@ -37,14 +37,8 @@ ACTIONS: tuple[ActionKind, ...] = get_args(ActionKind)
 PILOTED: tuple[ActionKind, ...] = ACTIONS[2:]
 """Actions through the whole autopilot."""
 ENDS = (
-    "",
-    "too far from the reference",
-    "ground",
-    "state not finite",
-    "action not finite",
-    "disarmed",
-    "gate missed",
-    "finished",
+    *("", "too far from the reference", "ground", "state not finite"),
+    *("action not finite", "disarmed", "gate missed", "finished"),
 )
 _COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 _NEAR: dict[str, Any] = {
@@ -136,9 +130,8 @@ class Episodes:
         for value in max_rates:
             within("max_rates", value, 0.1, 50.0, "rad/s")
         if reward is not None and not callable(reward):
-            raise GymError(
-                f'reward must be a function of a GymTransition, not {type(reward).__name__} "{shown(reward)}"'
-            )
+            kind = type(reward).__name__
+            raise GymError(f'reward must be a function of a GymTransition, not {kind} "{shown(reward)}"')
         self.count, self.interval_s, self.preview, self.history = count, 1.0 / rate, preview, history
         self.length = max(1, round(duration * rate))
         self.action, self._reward, self._limit_m = action, reward, float(limit_m)
@@ -242,25 +235,14 @@ class Episodes:
         kernels.advance(
             self.x[rows],
             actions[rows],
-            self._last[rows],
-            self._older[rows],
-            self.steps[rows],
-            self._passed[rows],
-            self.flying[rows],
-            self._parameters[rows],
-            self._mixers[rows],
-            self._scales[rows],
+            *(self._last[rows], self._older[rows], self.steps[rows], self._passed[rows], self.flying[rows]),
+            *(self._parameters[rows], self._mixers[rows], self._scales[rows]),
             self.reference,
             self._stride,
             self.action == "rates",
-            self.interval_s,
-            self._substeps,
-            self._limit_m,
-            self._floor_m,
-            self.gate_m,
-            self.observations[rows],
-            self._rewards[rows],
-            self._ends[rows],
+            *(self.interval_s, self._substeps),
+            *(self._limit_m, self._floor_m, self.gate_m),
+            *(self.observations[rows], self._rewards[rows], self._ends[rows]),
         )
 
     def info(self) -> dict[str, Any]:
@@ -291,26 +273,14 @@ class Episodes:
 
     def _memory(self) -> tuple[Any, ...]:
         return (
-            self.x,
-            self._last,
-            self._older,
-            self.steps,
-            self._passed,
-            self._parameters,
-            self._mixers,
-            self._scales,
-            self._ends,
-            self._rewards,
-            self.observations,
-            self.flying,
+            *(self.x, self._last, self._older, self.steps, self._passed, self._parameters, self._mixers, self._scales),
+            *(self._ends, self._rewards, self.observations, self.flying),
         )
 
     def _sampled(self, given: Any, duration_s: float) -> Array:
         """Return position and velocity at each interval of an episode and its preview, (m, 6), ENU."""
-        is_named = isinstance(given, str | Trajectory)
-        track = load_track(
-            given if is_named else sampled_track(given, duration_s), self.vehicle, load_profile("flight")
-        )
+        named = given if isinstance(given, str | Trajectory) else sampled_track(given, duration_s)
+        track = load_track(named, self.vehicle, load_profile("flight"))
         times_s = np.arange(self.length + 2 + self.preview * self._stride, dtype=np.float64) * self.interval_s
         return np.ascontiguousarray(np.hstack([position(track.track, times_s, order) for order in (0, 1)]))
 
@@ -340,16 +310,9 @@ class Episodes:
         if lost >= 0:
             for name in ("thrust", "yaw_moment", "power"):
                 parameters[name][0, lost] = 0.0
-        return Begun(
-            vehicle,
-            wind,
-            lost,
-            np.array((*world.state, *world.rotor_speeds, 0.0)),
-            level_action(world.rotor_speeds, vehicle, rates=self.action == "rates"),
-            parameters,
-            mixer,
-            scale,
-        )
+        x = np.array((*world.state, *world.rotor_speeds, 0.0))
+        action = level_action(world.rotor_speeds, vehicle, rates=self.action == "rates")
+        return Begun(vehicle, wind, lost, x, action, parameters, mixer, scale)
 
     def _built(self, changes: list[tuple[str, Any]]) -> tuple[Any, ...]:
         """Return the vehicle with changes, and what follows from it; the last one is kept."""

@@ -55,14 +55,9 @@ def _inputs(episodes: Episodes) -> PolicyInputs:
             raise GymError(f"{name} must be whole milliseconds in flight, not {value:g} ms")
     p, q, r = episodes.max_rates
     kind: Any = episodes.action
-    return PolicyInputs(
-        action=kind,
-        interval_ms=round(ms),
-        preview=episodes.preview,
-        preview_ms=round(preview_ms),
-        history=episodes.history,
-        max_rates_rad_s=(p, q, r),
-    )
+    preview, history = episodes.preview, episodes.history
+    times = {"interval_ms": round(ms), "preview_ms": round(preview_ms)}
+    return PolicyInputs(action=kind, preview=preview, history=history, max_rates_rad_s=(p, q, r), **times)
 
 
 def _read(path: Path) -> bytes:

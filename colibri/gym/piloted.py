@@ -217,9 +217,8 @@ class PilotedEpisodes(Episodes):
     def _judge(self, change: float, before: Vector) -> None:
         x, k, limits = self.x[0], self.at[0], (self._limit_m, self._floor_m)
         if self.gate_m:
-            reward, end, self._passed[0] = kernels.judge_race(
-                x, before, change, self.reference, k, self.gate_m, *limits
-            )
+            judged = kernels.judge_race(x, before, change, self.reference, k, self.gate_m, *limits)
+            reward, end, self._passed[0] = judged
         else:
             reward, end = kernels.judge(x, change, self.reference, k, *limits)
         if end == 0 and not self._flight.autopilot.stages.pilot.state.armed:

@@ -6,13 +6,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
 
-from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import freeze_once
 from colibri.common.spec import values_of
-from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.launcher import Launcher
-from colibri.sitl.backends.lockstep import AutopilotSide, LockstepSession, PlantSide, QuickClock
+from colibri.sitl.backends.lockstep import LockstepSession, PlantSide, QuickClock
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
@@ -48,24 +46,20 @@ class Flights:
 
     def _lockstep(self, setting: Setting, state: Path) -> LockstepSession:
         state.mkdir()
+        launcher = self._launcher
+        plant: PlantSide
         try:
-            plant = self._plant(setting.plant_spec(), state)
+            if launcher is not None and launcher.starts_plants:
+                plant = UdpPlant(launcher, setting.plant_spec(), state)
+            else:
+                plant = MemoryPlant(setting.plant_spec(), QuickClock() if launcher else None)
         except VehicleError as error:
             raise SettingError(str(error)) from error
         self._ends.callback(plant.close)
-        autopilot = self._autopilot(setting.autopilot_spec(state), state)
+        spec = setting.autopilot_spec(state)
+        autopilot = UdpAutopilot(launcher, spec, state) if launcher else MemoryAutopilot(spec)
         self._ends.callback(autopilot.close)
         return LockstepSession(plant, autopilot, setting.system, setting.rotors, setting.seed)
-
-    def _plant(self, spec: PlantSpec, state: Path) -> PlantSide:
-        if self._launcher is None:
-            return MemoryPlant(spec)
-        if not self._launcher.starts_plants:
-            return MemoryPlant(spec, QuickClock())
-        return UdpPlant(self._launcher, spec, state)
-
-    def _autopilot(self, spec: AutopilotSpec, state: Path) -> AutopilotSide:
-        return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
         """Write records, figures and facts below `folder`; return the folders."""

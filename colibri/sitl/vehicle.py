@@ -212,14 +212,9 @@ class Sitl(View, Stepped, Steered):
         x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
         heading = yaw if yaw != yaw else 0.5 * pi - yaw
         said = len(self.gcs.texts)
-        result = self.gcs.order_int(
-            mav.MAV_CMD_DO_REPOSITION,
-            *(speed, 1.0, 0.0, heading),
-            frame=mav.MAV_FRAME_GLOBAL,
-            x=x,
-            y=y,
-            z=there.altitude_m,
-        )
+        params, place = (speed, 1.0, 0.0, heading), {"x": x, "y": y}
+        frame, z = mav.MAV_FRAME_GLOBAL, there.altitude_m
+        result = self.gcs.order_int(mav.MAV_CMD_DO_REPOSITION, *params, frame=frame, **place, z=z)
         self.gcs.check(result, said, "going there")
         if wait:
             goal = (east, north, up)
@@ -255,13 +250,9 @@ class Sitl(View, Stepped, Steered):
         self.select(Mode.MISSION)
         if not self.armed:
             self.arm()
-        if self._mission_waits:
-            self.gcs.command(mav.MAV_CMD_MISSION_START, what="the mission")
-
-    @property
-    def _mission_waits(self) -> bool:
         book = self._conventions.modes
-        return book.numbers[book.chosen[Mode.MISSION]].waits and self.mode is not Mode.MISSION
+        if book.numbers[book.chosen[Mode.MISSION]].waits and self.mode is not Mode.MISSION:
+            self.gcs.command(mav.MAV_CMD_MISSION_START, what="the mission")
 
     def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a mission; where item 0 is home, it is put before the plan."""
@@ -339,9 +330,8 @@ class Sitl(View, Stepped, Steered):
             return f'feedback is "{self.setting.feedback}", and sensors are not used: set feedback="sensors"'
         p4, p5, p6, p7 = (*map(float, values), *(0.0,) * 4)[:4]
         judgement = judged(fault._replace(values=(p4, p5, p6, p7)), tuple(Equipment))
-        return (
-            judgement.reason if isinstance(judgement, Refusal) else f"the vehicle has no {short_unit_name(fault.unit)}"
-        )
+        missing = f"the vehicle has no {short_unit_name(fault.unit)}"
+        return judgement.reason if isinstance(judgement, Refusal) else missing
 
     @property
     def wind(self) -> str:
@@ -350,7 +340,6 @@ class Sitl(View, Stepped, Steered):
 
     @wind.setter
     def wind(self, wind: str | None) -> None:
-        """The mean wind, as in mark `wind`; may be set to a constant wind."""
         try:
             constant = constant_wind(str(wind or CALM))
         except ArgumentTypeError as error:
@@ -365,7 +354,6 @@ class Sitl(View, Stepped, Steered):
 
     @payload_kg.setter
     def payload_kg(self, mass_kg: float) -> None:
-        """Payload, kg; may be set."""
         if not 0.0 <= mass_kg <= MAX_PAYLOAD_KG:
             raise ValueError(f"payload_kg must be from 0 to {MAX_PAYLOAD_KG:g}, not {mass_kg!r}")
         self._payload_kg = mass_kg

@@ -1,6 +1,6 @@
 """Named flights."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -64,6 +64,25 @@ class SitlCase:
             finally:
                 flights.keep(out, figures=False)
         return sitl.sha256
+
+
+SHOWN = 16
+"""Characters of a hash in tables."""
+
+
+def show_table(title: str, headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(title), title_justify="left")
+    *names, last = headings
+    for heading in names:
+        table.add_column(heading, no_wrap=True)
+    table.add_column(last, min_width=SHOWN)  # an error may be longer than the line
+    for row in rows:
+        table.add_row(*map(escape, row))
+    Console().print(table)
 
 
 def _write(path: Path, text: str) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
@@ -14,12 +15,11 @@ from colibri.common.errors import Error, unknown
 from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.flights.folder import make_folder
-from colibri.verification.cases import SitlCase, TrackCase
+from colibri.verification.cases import SHOWN, SitlCase, TrackCase, show_table
 from colibri.verification.golden_flights import FLIGHTS
 
 FOUND = "golden.json"
 """File of the results in the folder of the logs."""
-_SHOWN = 16
 _NO_HASH = "-"
 
 _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
@@ -111,35 +111,20 @@ def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterabl
 
 
 def _print(outcomes: Sequence[GoldenResult], known: Mapping[str, str], args: argparse.Namespace) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     took_s = sum(outcome.wall_time_s for outcome in outcomes)
     title = f"{len(outcomes)} golden flights over {args.link} in {took_s:.0f} s; logs in {args.out}"
-    table = Table(title=escape(title), title_justify="left")
-    for column in ("flight", "took", "expected"):
-        table.add_column(column, no_wrap=True)
-    table.add_column("found", min_width=_SHOWN)
+    rows = []
     for outcome in outcomes:
         expected = known[outcome.name]
-        found = "the same" if outcome.sha256 == expected else outcome.sha256[:_SHOWN] or escape(outcome.error)
-        table.add_row(outcome.name, f"{outcome.wall_time_s:.1f} s", expected[:_SHOWN], found)
-    Console().print(table)
+        found = "the same" if outcome.sha256 == expected else outcome.sha256[:SHOWN] or outcome.error
+        rows.append((outcome.name, f"{outcome.wall_time_s:.1f} s", expected[:SHOWN], found))
+    show_table(title, ("flight", "took", "expected", "found"), rows)
 
 
 def _print_changes(path: Path, old: Mapping[str, str], new: Mapping[str, str]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     changed = [name for name in {**new, **old} if old.get(name) != new.get(name)]
-    table = Table(title=escape(f"{path}: {len(changed)} of {len(new)} changed"), title_justify="left")
-    for column in ("flight", "was", "is"):
-        table.add_column(column, no_wrap=True)
-    for name in changed:
-        table.add_row(escape(name), *(hashes.get(name, _NO_HASH)[:_SHOWN] for hashes in (old, new)))
+    rows = [(name, *(hashes.get(name, _NO_HASH)[:SHOWN] for hashes in (old, new))) for name in changed]
     if changed:
-        Console().print(table)
+        show_table(f"{path}: {len(changed)} of {len(new)} changed", ("flight", "was", "is"), rows)
     else:
-        Console().print(escape(f"{path}: nothing changed"), soft_wrap=True)
+        sys.stdout.write(f"{path}: nothing changed\n")

@@ -9,9 +9,8 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.flights.processes import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.verification.cases import TrackCase
+from colibri.verification.cases import SHOWN, TrackCase, show_table
 
-_SHOWN = 16
 DEFAULT_DURATION_S = 20.0
 
 CASES = (
@@ -24,13 +23,7 @@ CASES = (
     TrackCase("spiral-on-sensors", {"track": "spiral", "profile": "flight", "feedback": Feedback.SENSORS}),
     TrackCase(
         "wave-on-sensors-in-gusts",
-        {
-            "track": "wave",
-            "profile": "flight",
-            "feedback": Feedback.SENSORS,
-            "wind": "8@270",
-            "turbulence": "moderate",
-        },
+        {"track": "wave", "profile": "flight", "feedback": Feedback.SENSORS, "wind": "8@270", "turbulence": "moderate"},
     ),
 )
 SEED = 7
@@ -75,15 +68,10 @@ def _verdict(case: TrackCase, args: argparse.Namespace) -> CaseResult:
 
 
 def _print(verdicts: list[CaseResult], args: argparse.Namespace) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     title = f"{args.duration:g} s, seed {SEED}, twice over {args.link} and once in memory; logs in {args.out}"
-    table = Table(title=title, title_justify="left")
-    for column in ("flight", "trajectory", "replayed", "the same"):
-        table.add_column(column, no_wrap=True)
+    rows = []
     for verdict in verdicts:
         replayed = f"{verdict.commands} commands" if verdict.replays else "differs"
-        hashes = dict.fromkeys(sha256[:_SHOWN] for sha256 in verdict.hashes)
-        table.add_row(verdict.name, "\n".join(hashes), replayed, "yes" if verdict.same else "NO")
-    Console().print(table)
+        hashes = dict.fromkeys(sha256[:SHOWN] for sha256 in verdict.hashes)
+        rows.append((verdict.name, "\n".join(hashes), replayed, "yes" if verdict.same else "NO"))
+    show_table(title, ("flight", "trajectory", "replayed", "the same"), rows)

@@ -4,9 +4,10 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 from colibri.common.spec import to_json
 from colibri.flights.launcher import Child, ProcessSpec, how_it_ended, name_of
@@ -29,19 +30,12 @@ class Launcher:
             command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
             self._server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
-    def start(self, spec: ProcessSpec, log: Path) -> "Child | _ForkedChild":
-        if self._server is None:
-            return Child(spec, log=log)
-        log.touch()
-        pid = self._request("start", name_of(spec), str(log), to_json(spec).decode())
-        assert pid is not None, "whatever is forked has a number"
-        return _ForkedChild(pid, self._request)
-
     def close(self) -> None:
         if self._server is not None:
             self._server.communicate()
 
-    def _request(self, *words: str) -> int | None:
+    def request(self, *words: str) -> int | None:
+        """Ask the server, as `fork_server` describes."""
         assert self._server is not None, "it was started"
         stdin, stdout = self._server.stdin, self._server.stdout
         assert stdin is not None, "it is piped"
@@ -55,44 +49,41 @@ class Launcher:
         return answer
 
 
-class _ForkedChild:
-    def __init__(self, pid: int, request: Callable[..., int | None]) -> None:
-        self.number = pid
-        self._request = request
-        self._code: int | None = None
-
-    def code(self) -> int | None:
-        if self._code is None:
-            self._code = self._request("code", str(self.number))
-        return self._code
-
-    def kill(self) -> None:
-        if self._code is None:
-            self._code = self._request("kill", str(self.number))
-
-
 class LoggedChild:
+    """A process of a flight; its output goes to `log`."""
+
     def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
-        self.name = name_of(spec)
-        self.log = log
-        self._running = launcher.start(spec, log)
-        self.number = self._running.number
+        self.name, self.log = name_of(spec), log
+        self._launcher = launcher
+        self._child = Child(spec, log=log) if launcher.starts_plants else None
+        self._code: int | None = None
+        if self._child is not None:
+            self.number = self._child.number
+            return
+        log.touch()
+        number = launcher.request("start", self.name, str(log), to_json(spec).decode())
+        assert number is not None, "whatever is forked has a number"
+        self.number = number
 
     def check(self) -> None:
         """Raise SessionError if the process has died."""
-        code = self._running.code()
-        if code is None:
-            return
-        words = self.last_words()
-        raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
-
-    def last_words(self) -> str:
-        text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
-        lines = [line for line in text.splitlines() if line and not line.startswith("{")]
-        return lines[-1] if lines else ""
+        code = self._ask("code")
+        if code is not None:
+            text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
+            lines = [line for line in text.splitlines() if line and not line.startswith("{")]
+            raise SessionError(": ".join([f"the {self.name} {how_it_ended(code)}", *lines[-1:]]))
 
     def kill(self) -> None:
-        self._running.kill()
+        self._ask("kill")
+
+    def _ask(self, what: Literal["code", "kill"]) -> int | None:
+        """Return the exit code, `None` while it runs."""
+        if self._child is None:
+            self._code = self._launcher.request(what, str(self.number)) if self._code is None else self._code
+            return self._code
+        if what == "kill":
+            self._child.kill()
+        return self._child.code()
 
 
 @contextmanager

@@ -19,7 +19,6 @@ from colibri.plant.physics.world import World, state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.spec import PlantSpec
-from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.lockstep import LinkClock, LockstepSession, SessionError, StoppedClock
 from colibri.sitl.backends.setting import SettingError
 from colibri.sitl.errors import SitlError
@@ -36,16 +35,12 @@ class MemoryPlant:
     process = None
 
     def __init__(self, spec: PlantSpec, clock: LinkClock | None = None) -> None:
-        try:
-            self._builder = builder_of(spec)
-        except VehicleError as error:
-            raise SettingError(str(error)) from error
-        serves = tuple(self._builder.starts)
+        self._builder = builder_of(spec)
         self._answered = False
         self._end = PlantEnd(
             system_id=spec.system_id,
             frame_interval_us=round(1e3 / spec.rate) * 1000,
-            serves=serves,
+            serves=tuple(self._builder.starts),
             rotors=self._builder.vehicle.rotors.count,
         )
         self.plant: Plant | None = None
@@ -64,10 +59,12 @@ class MemoryPlant:
         self._answered = True
 
     def frame(self) -> list[bytes]:
+        """Return the datagrams up to the next frame, which comes last."""
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def listen(self, timeout_s: float) -> list[bytes]:
+        """Return the datagrams sent within `timeout_s`; an unanswered frame is repeated."""
         if self._answered:
             self._offer()
         else:

@@ -25,7 +25,7 @@ _HERE = "udpin:127.0.0.1:0"
 
 
 class UdpPlant:
-    """A plant in another process; see `lockstep.Plant`."""
+    """A plant in another process, with the methods of `MemoryPlant`."""
 
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
@@ -83,7 +83,7 @@ class UdpPlant:
 
 
 class UdpAutopilot:
-    """An autopilot in another process; see `lockstep.Autopilot`."""
+    """An autopilot in another process, with the methods of `MemoryAutopilot`."""
 
     def __init__(self, launcher: Launcher, spec: AutopilotSpec, folder: Path) -> None:
         self._launcher = launcher
@@ -140,13 +140,12 @@ class UdpAutopilot:
             if step_message is not None:
                 return step_message
 
-    def kill(self) -> None:
-        self.close()
-
     def close(self) -> None:
         self._child.kill()
         self._link.close()
         self._stations.close()
+
+    kill = close
 
 
 def opened(url: str) -> UdpLink:
