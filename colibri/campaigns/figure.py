@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
 from colibri.campaigns.factors import is_number
-from colibri.campaigns.results import CampaignResults, wilson
+from colibri.campaigns.flight_table import FlightTable, wilson
 from colibri.common.spec import fields_of
 from colibri.common.types import Array
 from colibri.flights.spec import FlightSpec
@@ -42,7 +42,7 @@ class _Group(NamedTuple):
     places: list[int]
 
 
-def draw(table: CampaignResults, metric: str | None = None) -> Figure:
+def draw(table: FlightTable, metric: str | None = None) -> Figure:
     name = metric or table.usual_metric
     values = table.metric(name)
     grid = table.campaign.grid
@@ -74,7 +74,7 @@ def label_of(name: str) -> str:
     return f"{text} ({unit})" if unit else text
 
 
-def _groups(table: CampaignResults, along: Sequence[str]) -> list[_Group]:
+def _groups(table: FlightTable, along: Sequence[str]) -> list[_Group]:
     names = list(table.campaign.grid)
     several = [name for name, values in table.campaign.grid.items() if len(values) > 1 and name not in along]
     columns = {name: table.factor(name) for name in along}
@@ -88,18 +88,18 @@ def _groups(table: CampaignResults, along: Sequence[str]) -> list[_Group]:
     ]
 
 
-def _title(table: CampaignResults) -> str:
+def _title(table: FlightTable) -> str:
     lost = sum(each.verdict.is_lost for each in table.flown)
     return f"{table.campaign.name}: {len(table.flown)} flights, {lost} lost"
 
 
-def _flown(table: CampaignResults, values: Array, places: Sequence[int]) -> Array:
+def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
     found: Array = values[table.through(places)]
     known: Array = found[np.isfinite(found)]
     return known
 
 
-def _lines(table: CampaignResults, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
+def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
     """Draw median and 5 to 95 % range over a factor, and the share of lost flights."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
@@ -129,9 +129,7 @@ def _lines(table: CampaignResults, metric: str, values: Array, along: str, group
     return figure
 
 
-def _heat_map(
-    table: CampaignResults, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]
-) -> Figure:
+def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]) -> Figure:
     names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
     xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
     figure, grid = axes_grid(len(names), 1, 0.6, row_in=_MAP_IN, share=False)
@@ -160,9 +158,7 @@ def _heat_map(
     return figure
 
 
-def _scatter(
-    table: CampaignResults, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]
-) -> Figure:
+def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
@@ -182,7 +178,7 @@ def _scatter(
     return figure
 
 
-def _strips(table: CampaignResults, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
+def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
     make_room_for_names(figure, names)

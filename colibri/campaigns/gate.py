@@ -10,9 +10,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from colibri.analysis.limits import ReportLimit, above, loss_exceeds
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.metrics import Metric
-from colibri.campaigns.results import CampaignResults
 from colibri.common.process.lifecycle import EXIT_FAILED
 
 
@@ -22,7 +22,7 @@ def with_limits(metrics: Iterable[Metric], limits: Iterable[ReportLimit]) -> tup
     return (*kept, *(Metric(key) for key in dict.fromkeys(limit.key for limit in limits) if key not in names))
 
 
-def handed_over(table: CampaignResults, args: Namespace) -> int:
+def handed_over(table: FlightTable, args: Namespace) -> int:
     """Write the files of `--json` and `--junit`, report exceeded limits, and return the exit code."""
     lost = loss_exceeds(args.fail_lost, len(table.flown) - table.verdicts[Verdict.FLOWN], len(table.flown))
     reasons = [_above(table, each, args.fail_above) for each in table.flown]
@@ -42,14 +42,14 @@ def handed_over(table: CampaignResults, args: Namespace) -> int:
     return EXIT_FAILED if wrong else 0
 
 
-def _above(table: CampaignResults, each: FlightResult, limits: Iterable[ReportLimit]) -> list[str]:
+def _above(table: FlightTable, each: FlightResult, limits: Iterable[ReportLimit]) -> list[str]:
     if each.verdict is not Verdict.FLOWN:
         return []
     values = dict(zip((metric.name for metric in table.campaign.metrics), each.metrics, strict=True))
     return [reason for limit in limits if (reason := above(limit, values[limit.key]))]
 
 
-def _facts(table: CampaignResults, out: Path, wrong: list[str]) -> dict[str, Any]:
+def _facts(table: FlightTable, out: Path, wrong: list[str]) -> dict[str, Any]:
     headings, rows = table.summary()
     return {
         "name": table.campaign.name,
@@ -72,7 +72,7 @@ def _value(cell: str) -> Any:
     return cell or None
 
 
-def _write_junit(table: CampaignResults, reasons: list[list[str]], path: Path, *, lost: bool) -> None:
+def _write_junit(table: FlightTable, reasons: list[list[str]], path: Path, *, lost: bool) -> None:
     """Write one test case for each flight; flights lost within `--fail-lost` are skipped."""
     suite = ElementTree.Element("testsuite", name=table.campaign.name, tests=str(len(reasons)))
     factors = len(table.campaign.factors) + 2

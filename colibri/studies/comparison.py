@@ -15,10 +15,10 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Point, campaign_of
 from colibri.campaigns.engines.pool import Pool, with_bar
 from colibri.campaigns.factors import CampaignError, shown
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points, plan_point
 from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
-from colibri.campaigns.results import CampaignResults
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes
 from colibri.common.spec import keywords_of
@@ -61,7 +61,7 @@ def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = N
     return found
 
 
-def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> CampaignResults:
+def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:
     """Fly all contenders, tracks and seeds; `NAME-journal.jsonl` records each flight as it ends."""
     planned = _campaign(args, name, metrics, logs)
     if planned.flights > MAX_UNASKED:
@@ -84,7 +84,7 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
         _fly(left, common, kept, args)
     for flight, _, _, folder in points:
         flown[flight] = flown[flight]._replace(why=flown[flight].why.replace(folder, str(args.out / folder)))
-    return CampaignResults(planned, flown, notes)
+    return FlightTable(planned, flown, notes)
 
 
 def _different_vehicles(points: Sequence[Point], common: Common) -> list[str]:

@@ -12,7 +12,7 @@ from colibri.analysis.estimation import MEASURED, NAVIGATION, bounds
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.campaigns.figure import make_room_for_names
-from colibri.campaigns.results import CampaignResults
+from colibri.campaigns.flight_table import FlightTable
 
 _LABEL_IN = 0.8
 _MAX_DECADES = 12
@@ -44,7 +44,7 @@ _BY_TRUTH = ("RMS (m)", {_TRUE: ("#000000", "off its reference")})
 """The only panel of a flight on the state."""
 
 
-def draw_seeds(table: CampaignResults, out: Path) -> list[Path]:
+def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
     """Draw `seeds.png`: a dot a flight, a bar at the median; NEES and NIS with their bounds."""
     cases = table.groups()
     estimated = not np.isnan(table.metric("estimation_rmse_m.horizontal")).all()
@@ -83,7 +83,7 @@ def _shift(number: int, of: int) -> float:
     return min(0.26, 0.85 / of) * (number - 0.5 * (of - 1))
 
 
-def _draw_nees(axes: Axes, table: CampaignResults) -> None:
+def _draw_nees(axes: Axes, table: FlightTable) -> None:
     _strips(axes, table, "nees_mean", "#000000", "", 0.0, np.mean)
     within = bounds(NAVIGATION, len(table.campaign.seeds))
     axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
@@ -91,7 +91,7 @@ def _draw_nees(axes: Axes, table: CampaignResults) -> None:
     axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all", loc="right")
 
 
-def _draw_nis(axes: Axes, table: CampaignResults) -> None:
+def _draw_nis(axes: Axes, table: FlightTable) -> None:
     for number, (kind, numbers) in enumerate(MEASURED.items()):
         shift = _shift(number, len(MEASURED))
         _strips(axes, table, f"nis_mean.{kind}.mean", _NIS_COLORS[number % len(_NIS_COLORS)], kind, shift)
@@ -111,7 +111,7 @@ def _draw_nis(axes: Axes, table: CampaignResults) -> None:
 
 def _strips(
     axes: Axes,
-    table: CampaignResults,
+    table: FlightTable,
     metric: str,
     color: str,
     called: str,

@@ -9,10 +9,10 @@ import numpy as np
 from colibri.analysis.estimation import MEASURED, rms
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, comma_separated, print_table, write_table
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Verdict
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.metrics import Metric
-from colibri.campaigns.results import CampaignResults
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.studies.comparison import fly_comparison
@@ -60,7 +60,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
     return handed_over(table, args)
 
 
-def _cells(table: CampaignResults, places: Sequence[int]) -> Row:
+def _cells(table: FlightTable, places: Sequence[int]) -> Row:
     """Return RMS over the flights, the mean of NEES, and in brackets the largest of one flight."""
     through = table.through(places)
     errors = (_cell(table.metric(name)[through], rms) for name in _ERRORS)

@@ -10,8 +10,8 @@ from colibri.analysis.tables import Row
 from colibri.autopilot.control.profile import Profile
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.factors import shown
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult
-from colibri.campaigns.results import CampaignResults
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning
 from colibri.tuning.space import SHARE_LOST, Objective, value_of
@@ -75,7 +75,7 @@ def check_campaign(tuning: Tuning, before: Profile, after: Profile) -> Campaign:
     )
 
 
-def compare(tuning: Tuning, table: CampaignResults) -> list[Compared]:
+def compare(tuning: Tuning, table: FlightTable) -> list[Compared]:
     pairs = _Pairs(table)
     others = [metric.name for metric in table.campaign.metrics]
     wanted = {objective.metric for objective in tuning.objectives}
@@ -86,7 +86,7 @@ def compare(tuning: Tuning, table: CampaignResults) -> list[Compared]:
 
 
 class _Pairs:
-    def __init__(self, table: CampaignResults) -> None:
+    def __init__(self, table: FlightTable) -> None:
         self._campaign = table.campaign
         self._seeds = len(table.campaign.seeds)
         combinations = table.campaign.combinations // 2

@@ -11,8 +11,8 @@ from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.campaigns.definition import CampaignTables, campaign_of
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.factors import shown
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.results import CampaignResults
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
@@ -97,7 +97,7 @@ def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pyte
         point.flight: FlightResult(point.flight, verdicts[shown(point.factors["contender"])], "", values, "")
         for point in planned.points()
     }
-    seed_figures.draw_seeds(CampaignResults(planned, flown), Path())
+    seed_figures.draw_seeds(FlightTable(planned, flown), Path())
     (figure,) = drawn
     figure.draw_without_rendering()
     assert min(text.get_window_extent().x0 for axes in figure.axes for text in axes.get_yticklabels()) > 0.0

@@ -54,9 +54,9 @@ def parser_of(*whole: str) -> ArgumentParser:
     parser.add_argument("--version", action=Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of those below")
     for name, command in COMMANDS.items():
-        texts = {"help": command.does, "description": command.does}
-        texts["epilog"] = f"examples:\n{indent(command.examples, '  ')}"
-        options = commands.add_parser(name, **texts, formatter_class=RawDescriptionHelpFormatter)
+        examples = f"examples:\n{indent(command.examples, '  ')}"
+        options = commands.add_parser(name, help=command.does, description=command.does, epilog=examples)
+        options.formatter_class = RawDescriptionHelpFormatter
         if name in whole:
             subcommand(name).add_options(options)
     for name, does in PROCESSES.items():

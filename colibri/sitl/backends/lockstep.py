@@ -5,7 +5,7 @@ Each side may be in this process or another; the bytes are the same. Flights are
 
 from collections.abc import Sequence
 from time import perf_counter, sleep
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import (
@@ -29,12 +29,6 @@ from colibri.mavlink.wire.dialect import (
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 
-if TYPE_CHECKING:
-    from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
-    from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
-
-PlantSide: TypeAlias = "MemoryPlant | UdpPlant"
-AutopilotSide: TypeAlias = "MemoryAutopilot | UdpAutopilot"
 _QUICK = 10.0
 _SOON_S = 2e-4
 
@@ -76,6 +70,53 @@ _GIVE_UP_S = 200.0
 
 class SessionError(SitlError):
     """A flight cannot go on: a process has died or is silent."""
+
+
+class PlantSide(Protocol):
+    """The plant's side; `process` is its id if it has its own."""
+
+    @property
+    def process(self) -> int | None: ...
+
+    @property
+    def clock(self) -> LinkClock: ...
+
+    def receive(self, datagram: bytes) -> None: ...
+
+    def frame(self) -> list[bytes]:
+        """Return the datagrams up to the next frame, which comes last."""
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return the datagrams sent within `timeout_s`; an unanswered frame is repeated."""
+
+    def close(self) -> None: ...
+
+
+class AutopilotSide(Protocol):
+    """The autopilot's side; `process` is its id if it has its own."""
+
+    @property
+    def process(self) -> int | None: ...
+
+    def call(self) -> bytes: ...
+
+    def expect(self, step_message: StepMessage) -> None:
+        """Process the datagrams of ground stations for the next frame."""
+
+    def receive(self, datagram: bytes) -> None: ...
+
+    def listen(self) -> list[bytes]: ...
+
+    def answer(self) -> bytes: ...
+
+    def to_stations(self) -> StepMessage: ...
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+
+    def start(self) -> None: ...
+
+    def close(self) -> None: ...
 
 
 class Instant(NamedTuple):

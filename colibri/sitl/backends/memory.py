@@ -59,12 +59,10 @@ class MemoryPlant:
         self._answered = True
 
     def frame(self) -> list[bytes]:
-        """Return the datagrams up to the next frame, which comes last."""
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return the datagrams sent within `timeout_s`; an unanswered frame is repeated."""
         if self._answered:
             self._offer()
         else:

@@ -25,7 +25,7 @@ _HERE = "udpin:127.0.0.1:0"
 
 
 class UdpPlant:
-    """A plant in another process, with the methods of `MemoryPlant`."""
+    """A plant in another process."""
 
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
@@ -83,7 +83,7 @@ class UdpPlant:
 
 
 class UdpAutopilot:
-    """An autopilot in another process, with the methods of `MemoryAutopilot`."""
+    """An autopilot in another process."""
 
     def __init__(self, launcher: Launcher, spec: AutopilotSpec, folder: Path) -> None:
         self._launcher = launcher
@@ -145,7 +145,8 @@ class UdpAutopilot:
         self._link.close()
         self._stations.close()
 
-    kill = close
+    def kill(self) -> None:
+        self.close()
 
 
 def opened(url: str) -> UdpLink:

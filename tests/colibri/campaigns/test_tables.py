@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 
 from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.figure import label_of
+from colibri.campaigns.flight_table import wilson
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.results import CampaignResults, wilson
+from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import fly_campaign
 from tests.support.campaigns import MASS, Here, planned, results, tables_in
 

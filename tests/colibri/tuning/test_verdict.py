@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import colibri
+from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.results import CampaignResults
 from colibri.tuning.verdict import Compared, better, check_campaign, compare
 from tests.support.tuning import WEIGHTS, planned
 
@@ -27,7 +27,7 @@ def compared(after: Any, lost_after: int = 0, before: Any = 1.0, **tables: Any) 
         flight: FlightResult(flight, Verdict.LOST if flight in lost else Verdict.FLOWN, "", (float(value),), "")
         for flight, value in enumerate(values)
     }
-    return compare(tuning, CampaignResults(campaign, flown))
+    return compare(tuning, FlightTable(campaign, flown))
 
 
 def test_pairs_show_what_the_spread_of_seeds_would_hide() -> None:
