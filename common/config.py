@@ -19,7 +19,7 @@ _MOST = 1e12  # products of a few numbers up to there, and quotients, are finite
 
 
 def plain(value: Any) -> Any:
-    """Return NumPy's numbers and arrays, also those in lists, tuples and tables, as Python's."""
+    """Return NumPy's numbers and arrays, nested ones too, as Python's."""
     if hasattr(value, "dtype") and hasattr(value, "tolist"):
         return value.tolist()
     if type(value) in (list, tuple):
@@ -52,7 +52,7 @@ def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
 
 
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
-    """Read a strict structure; raise `error`, with file and key, if a key is missing, unknown or invalid."""
+    """Read a strict structure; `error` names file and key of what is missing, unknown or invalid."""
     try:
         return msgspec.toml.decode(read_bytes(path), type=kind)
     except OSError as reason:
@@ -99,7 +99,7 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def _numbers(value: Any, depth: int = 0) -> Iterator[tuple[float, bool]]:
-    """Yield each number, and whether it is in a vector of a list of vectors."""
+    """Yield each number, and whether it is in a list of vectors."""
     if isinstance(value, tuple):
         for part in value:
             yield from _numbers(part, depth + 1)
@@ -108,11 +108,7 @@ def _numbers(value: Any, depth: int = 0) -> Iterator[tuple[float, bool]]:
 
 
 def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
-    """Read a control law's table of a profile into a strict structure.
-
-    Raises:
-        SettingsError: A key is missing, unknown or invalid.
-    """
+    """Read a control law's table of a profile; raise `SettingsError` if a key is missing, unknown or invalid."""
     checked("table", table, Mapping, "a mapping of keys to values", SettingsError)
     try:
         return msgspec.convert(dict(table), type=kind)

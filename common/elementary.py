@@ -1,13 +1,11 @@
 """Elementary functions with the same bits on every computer, unlike the C library's.
 
-Each is an argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt` is exact
-everywhere, `math.hypot` is Python's own. `kernels` has the same functions compiled, `elementwise` for arrays.
+Each is an argument reduction and a Taylor series in IEEE 754 operations in the order written; `math.sqrt` and
+`math.hypot` are exact anyway. Errors stay below one unit in the last place for sin, cos, exp and log, below three for
+the others. Outside its domain a function returns nan or infinity.
 
-Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (tested against 60
-digits). Outside its domain a function returns nan or infinity, never raises.
-
-Reductions with head and tail (the head's rounding error) follow W. J. Cody and W. Waite, Software Manual for the
-Elementary Functions, 1980, and K. C. Ng, Argument Reduction for Huge Arguments, 1992.
+Reductions with head and tail (the head's rounding error): W. J. Cody and W. Waite, Software Manual for the Elementary
+Functions, 1980; K. C. Ng, Argument Reduction for Huge Arguments, 1992.
 """
 
 from math import copysign, factorial, floor, frexp, inf, isnan, ldexp, nan, pi, sqrt

@@ -1,4 +1,4 @@
-"""The functions of `elementary` for arrays of finite numbers, bit for bit: NumPy chooses its code by the CPU."""
+"""The functions of `elementary` for arrays of finite numbers, bit for bit."""
 
 from math import pi
 

@@ -1,17 +1,13 @@
-"""The base of all errors shown to users, the message for an unknown name, and values in messages."""
+"""The base of all errors shown to users, and the words of their messages."""
 
 from collections.abc import Iterable
 
 
 class Error(Exception):
-    """A user's error; the message names input, value and remedy in one line.
-
-    Each package has a base below it: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`, `CompanionError`. A
-    mistake in this program is another exception, with a traceback.
-    """
+    """A user's error; the message names input, value and remedy in one line."""
 
     def __str__(self) -> str:
-        """Return the message, or without one the name of the class: no line is empty."""
+        """Return the message, or the name of the class: no line is empty."""
         return super().__str__() or type(self).__name__
 
 
@@ -24,7 +20,7 @@ class InFlightError(Error):
 
 
 def unknown(what: str, given: object, known: Iterable[str]) -> str:
-    """Return the message for an unknown name, with the closest match or all valid names."""
+    """Return the message for an unknown name, with the closest or all valid names."""
     from difflib import get_close_matches
 
     names, text = [str(name) for name in known], shown(given)
@@ -34,13 +30,12 @@ def unknown(what: str, given: object, known: Iterable[str]) -> str:
 
 
 def checked(what: str, given: object, kinds: type | tuple[type, ...], wanted: str, error: type[Error]) -> None:
-    """Raise an error for a value of a wrong type."""
     if not isinstance(given, kinds):
         raise error(f'{what} must be {wanted}, not {type(given).__name__} "{shown(given)}"')
 
 
 def shown(given: object, most: int = 60) -> str:
-    """Return a value for a message: control characters escaped, and cut to `most` characters."""
+    """Return a value for a message: control characters escaped, cut to `most` characters."""
     text = str(given)
     whole = text if len(text) <= most else f"{text[: most // 2]}…{text[-(most // 2) :]}"
     return "".join(

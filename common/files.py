@@ -1,4 +1,4 @@
-"""Files opened without waiting: a FIFO, a device or a socket in a file's place is an error."""
+"""Files opened without waiting: a FIFO, device or socket is an error."""
 
 import os
 import stat
@@ -28,7 +28,7 @@ def regular(path: str, flags: int, mode: int = 0o666) -> int:
 
 
 def private(path: str, flags: int) -> int:
-    """Open a regular file as `regular`, and create it for its owner only."""
+    """Open a regular file; create it for its owner only."""
     return regular(path, flags, 0o600)
 
 
@@ -38,7 +38,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_with_mode(path: Path) -> tuple[bytes, int]:
-    """Return the content and the permissions of a file; where there are none, those of its owner only."""
+    """Return the content and the permissions of a file; without permissions, those of its owner only."""
     with open(path, "rb", opener=regular) as file:
         mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode) if os.name == "posix" else 0o600
         return file.read(), mode

@@ -24,21 +24,19 @@ _Tuple = TypeVar("_Tuple", bound=NamedTuple)
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function at its first call, and cache the machine code on disk.
+    """Compile a function at its first call, and cache the machine code on disk until a source changes.
 
-    The cache is renewed when the function's file changes, or that of a kernel it calls. Arithmetic is IEEE 754 in the
-    order written, for the same bits on every computer; division by zero gives infinity.
+    Arithmetic is IEEE 754 in the order written; division by zero gives infinity.
     """
     return cast(_Function, _kernel(function))
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a function into its callers, where array shapes are constants and loops over several are vectorised."""
+    """Compile a function into its callers, where array shapes are constants and loops are vectorised."""
     return cast(_Function, _kernel(function, forceinline=True))
 
 
 def without_gil(function: _Function) -> _Function:
-    """Compile a function that other threads may run beside."""
     return cast(_Function, _kernel(function, nogil=True))
 
 
@@ -56,7 +54,7 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 
 def packed(parameters: NamedTuple) -> Packed:
-    """Return the record of `parameters`, (1,), a kernel's argument, aligned to cache lines for speed."""
+    """Return the record of `parameters`, (1,), a kernel's argument, aligned to cache lines."""
     layout = _layout(parameters)
     memory = np.zeros(layout.itemsize + _LINE, dtype=np.uint8)
     begin = -memory.ctypes.data % _LINE
@@ -94,7 +92,7 @@ def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
 
 
 def on_compile(report: Callable[[int], None]) -> None:
-    """Report the number of functions compiled so far as each compilation begins, here or in a process waited for."""
+    """Report the number of functions compiled so far as each compilation begins, here or elsewhere."""
     compiling = _Compiling(report)
     register("numba:compile", compiling)  # type: ignore[no-untyped-call]
     waiting.append(compiling.on_wait)

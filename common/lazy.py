@@ -1,4 +1,4 @@
-"""Public names of a package, imported on first access because most are never used."""
+"""Public names of a package, imported on first access."""
 
 from collections.abc import Callable
 from functools import cache
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def public(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return `__getattr__` and `__dir__` of a package with the names that it imports under `if TYPE_CHECKING:`."""
+    """Return a package's `__getattr__` and `__dir__` of the names that it imports under `if TYPE_CHECKING:`."""
 
     @cache
     def places() -> dict[str, str]:

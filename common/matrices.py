@@ -1,7 +1,7 @@
-"""Small dense matrices in double precision with a fixed order of operations: the same bits on every computer.
+"""Small dense matrices with a fixed order of operations: the same bits on every computer.
 
-BLAS and LAPACK choose their code by the CPU; at sizes of 3 to 100 they are not faster. Matrices may have any strides
-but must be writable float64; results are new and C-ordered.
+BLAS and LAPACK choose their code by the CPU; at sizes of 3 to 100 they are not faster. Arguments must be writable
+float64; results are new and C-ordered.
 """
 
 from math import sqrt
@@ -19,7 +19,7 @@ _TAYLOR_NORM = 0.5  # larger matrices are halved and squared: 0.5^16 / 16! is fa
 
 @compiled
 def put(values: Array, out: Array) -> None:
-    """Write `values` into `out`; `out[:] = values` takes seconds to compile for its error path."""
+    """Write `values` into `out`; `out[:] = values` takes seconds to compile."""
     for i in range(out.shape[0]):
         out[i] = values[i]
 

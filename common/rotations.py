@@ -1,7 +1,7 @@
-"""Rotations of vectors and attitudes between body (FLU) and earth (ENU).
+"""Rotations between body (FLU) and earth (ENU).
 
-Vectors and quaternions are tuples of floats, several times faster than arrays at these sizes. Quaternions are wxyz,
-Hamilton, and rotate body vectors into the earth frame. Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
+Vectors and quaternions are tuples, faster than arrays at these sizes. Quaternions are wxyz, Hamilton, and rotate body
+vectors into the earth frame. Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
 """
 
 from math import degrees, floor, pi, sqrt
@@ -19,7 +19,7 @@ def normalized(q: Quaternion) -> Quaternion:
 
 
 def rotation_matrix(q: Quaternion) -> Matrix:
-    """Return R of THESIS [2.6], rows first: earth vector = R · body vector."""
+    """Return R of THESIS [2.6], rows first: earth = R · body."""
     w, x, y, z = q
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),

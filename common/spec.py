@@ -63,7 +63,7 @@ class Field(NamedTuple):
         return get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
 
     def read(self, given: Any) -> Any:
-        """Return the validated value of a Python value or text; `None` is the default."""
+        """Return the validated value of a value or text; `None` is the default."""
         if given is None or (isinstance(given, str) and not given):
             return self.default
         if not self.repeated:
@@ -138,7 +138,7 @@ class Field(NamedTuple):
 
 
 def fields_of(spec: type) -> dict[str, Field]:
-    """Return the options of a specification by name, its own before those of its bases."""
+    """Return the options of a specification, its own before those of its bases."""
     if spec not in _FIELDS:
         known = {each.name: each for each in fields(cast(Any, spec))}
         names = [name for kind in spec.__mro__ for name in vars(kind).get("__annotations__", ()) if name in known]
@@ -170,13 +170,7 @@ def add_options(
     given_only: bool = False,
     keywords_only: bool = False,
 ) -> None:
-    """Add the options of a specification to a command line.
-
-    Args:
-        shown: Defaults in words, by field.
-        given_only: Whether omitted options set no attribute.
-        keywords_only: Whether to add only the options of Python and campaigns.
-    """
+    """Add options to a command line; `shown` has defaults in words, `given_only` sets no attribute for omitted ones."""
     for field in fields_of(spec).values():
         wanted = field.option.keyword if keywords_only else field.option.on_command_line
         if wanted and field.name not in leave_out:
@@ -223,7 +217,7 @@ def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:
 def from_values(
     spec: type[S], values: Mapping[str, Any], error: type[Error] = SpecError, only: Collection[str] | None = None
 ) -> S:
-    """Return the specification of Python values or texts; raise `error` on an unknown or invalid option."""
+    """Return the specification of values or texts; raise `error` on an unknown or invalid option."""
     return spec(**read_values(spec, values, error, only))
 
 

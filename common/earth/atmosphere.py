@@ -1,4 +1,4 @@
-"""The standard atmosphere below 11 km: pressure ⇄ altitude (ICAO Doc 7488; ISO 2533)."""
+"""The standard atmosphere below 11 km: pressure ⇄ altitude above mean sea level (ICAO Doc 7488; ISO 2533)."""
 
 from colibri.common.kernels import power
 
@@ -11,12 +11,11 @@ METRES_PER_PASCAL = 0.0832  # at sea level
 
 
 def pressure_pa(altitude_m: float) -> float:
-    """Return the static pressure at an altitude above mean sea level."""
     return _SEA_LEVEL_PA * power(max(0.0, 1.0 - _LAPSE_K_M * altitude_m / _SEA_LEVEL_K), _EXPONENT)
 
 
 def altitude_m(pressure_pa: float) -> float:
-    """Return the altitude above mean sea level of a static pressure; negative counts as 0."""
+    """Return the altitude of a static pressure; negative counts as 0."""
     return _SEA_LEVEL_K / _LAPSE_K_M * (1.0 - power(max(0.0, pressure_pa) / _SEA_LEVEL_PA, 1.0 / _EXPONENT))
 
 

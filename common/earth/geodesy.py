@@ -1,7 +1,4 @@
-"""Latitude and longitude ⇄ metres east and north of an origin: the azimuthal equidistant projection of a sphere.
-
-Projection and radius are PX4's and its ground stations'. Altitude is not projected.
-"""
+"""Latitude and longitude ⇄ metres east and north: PX4's azimuthal equidistant projection of a sphere."""
 
 from collections.abc import Callable
 from math import degrees, hypot, radians

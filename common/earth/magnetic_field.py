@@ -1,7 +1,4 @@
-"""The earth's magnetic field at a place: the World Magnetic Model 2025 of NOAA and the British Geological Survey.
-
-https://www.ncei.noaa.gov/products/world-magnetic-model
-"""
+"""The earth's magnetic field: the World Magnetic Model 2025, https://www.ncei.noaa.gov/products/world-magnetic-model."""
 
 from functools import lru_cache
 
@@ -21,7 +18,7 @@ _MIN_HEIGHT_KM, _MAX_HEIGHT_KM = -1.0, 850.0
 
 @lru_cache(maxsize=64)
 def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
-    """Return the field in ENU of true north; the altitude is clamped to -1 to 850 km, `year` is decimal."""
+    """Return the field in ENU of true north; the altitude is clamped to -1 to 850 km."""
     altitude_km = min(max(place.altitude_m / 1e3, _MIN_HEIGHT_KM), _MAX_HEIGHT_KM)
     field = GeoMag(coefficients_data=WMM_2025).calculate(
         glat=place.latitude_deg, glon=place.longitude_deg, alt=altitude_km, time=year

@@ -1,4 +1,4 @@
-"""The key of a kernel's machine code: all that it is compiled from, wherever that is installed."""
+"""The key of a kernel's machine code: all that it is compiled from."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ def key_of(kernel: Any) -> str:
 
 
 def functions_of(function: Callable[..., Any]) -> set[FunctionType]:
-    """Return a function and all that it calls by global name or closure."""
+    """Return a function and all that it calls."""
     seen: set[FunctionType] = set()
     waiting: list[Any] = [function]
     while waiting:
@@ -50,7 +50,6 @@ def _contents_of(function: FunctionType) -> list[str]:
 
 @cache
 def _values_of(function: FunctionType) -> dict[str, Any]:
-    """Return the globals that a function may use, and its closure."""
     names = (name for code in _codes_of(function.__code__) for name in code.co_names)
     known = {name: function.__globals__[name] for name in names if name in function.__globals__}
     return {**known, **getclosurevars(function).nonlocals}
@@ -64,7 +63,7 @@ def _codes_of(code: CodeType) -> Iterator[CodeType]:
 
 
 def _text_of(value: Any) -> str:
-    """Return what of a value becomes part of machine code: nothing of functions, whose files are read, and modules."""
+    """Return what of a value becomes part of machine code; functions' files are read instead."""
     if isinstance(value, np.ndarray | np.generic):
         return f"{value.dtype.descr}{value.shape}{value.tobytes().hex()}"
     if isinstance(value, tuple):

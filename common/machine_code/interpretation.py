@@ -1,4 +1,4 @@
-"""Interpret kernels that another process is compiling, where the machine code is wanted and not the result."""
+"""Interpret kernels that another process is compiling, where their result is not worth the wait."""
 
 from typing import Any
 
@@ -8,12 +8,11 @@ from numba.core.registry import CPUDispatcher
 from colibri.common.machine_code import on_disk
 
 
-class _CompiledElsewhereError(Exception):
-    """Another process compiles the kernel that was called."""
+class _CompiledElsewhereError(Exception): ...
 
 
 class _Calls:
-    """Calls of kernels in this process; what a kernel itself calls is interpreted with it."""
+    """Calls of kernels; what a kernel itself calls is interpreted with it."""
 
     def __init__(self) -> None:
         self._call: Any = CPUDispatcher.__call__
@@ -38,20 +37,20 @@ class _Calls:
             self._interprets = False
 
     def on_wait(self) -> None:
-        """Raise instead of waiting for the kernel that was called; those that a compilation needs are waited for."""
+        """Raise instead of waiting for the kernel that was called; wait for those that a compilation needs."""
         if self._called is not None and not self._called._cache.is_compiling:  # noqa: SLF001
             raise _CompiledElsewhereError
 
 
 def interpret_while_waiting() -> None:
-    """Have processes that fly the same flight share the compilation of its kernels, for the rest of this process."""
+    """Share the compilation of kernels with the processes that fly the same flight."""
     calls = _Calls()
     CPUDispatcher.__call__ = lambda kernel, *args: calls.call(kernel, *args)  # type: ignore[assignment,method-assign]
     on_disk.waiting.append(calls.on_wait)
 
 
 def _with_attributes(value: Any) -> Any:
-    """Return an argument with the fields of records as attributes, as in kernels, sharing its memory."""
+    """Return an argument with the fields of records as attributes, sharing its memory."""
     if isinstance(value, np.ndarray) and value.dtype.names:
         return value.view(np.recarray)
     if isinstance(value, np.void):

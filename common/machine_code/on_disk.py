@@ -1,4 +1,4 @@
-"""numba's cache of machine code in the user's cache folder, by the content that it was compiled from."""
+"""numba's cache of machine code in the user's cache folder, by content."""
 
 import os
 import sys
@@ -26,14 +26,14 @@ _KEPT_UNUSED_S = 60 * 86400.0
 
 
 class MachineCode:
-    """The machine code of one kernel, located on first use: most kernels are part of their callers' code."""
+    """The machine code of one kernel, located on first use: most is part of the callers' code."""
 
     def __init__(self, kernel: Any) -> None:
         self._kernel = kernel
         self._turns: list[Turn] = []
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load machine code; without any, wait for a process that compiles it, or take the turn to do so."""
+        """Load machine code; without any, wait for a process that compiles it, or take the turn."""
         for kept in (self._cache, *self._read_only):
             found = kept.load_overload(sig, target_context)
             if found is not None:
@@ -48,8 +48,6 @@ class MachineCode:
         return found
 
     def in_turn(self, compile_for: Callable[[Any], Any]) -> Callable[[Any], Any]:
-        """Return `compile_for` that ends the turns it has taken."""
-
         def compile_in_turn(sig: Any) -> Any:
             turns = len(self._turns)
             try:
@@ -76,7 +74,6 @@ class MachineCode:
 
     @cached_property
     def _read_only(self) -> list[Any]:
-        """Folders that cannot be written to, as those of a container's image."""
         return [self._within(folder) for folder in folders() if folder.is_dir() and not _can_be_written(folder)]
 
     def _within(self, folder: Path) -> Any:
@@ -92,7 +89,6 @@ class _OnDisk(FunctionCache):
         super().__init__(function)
 
     def lock_file(self) -> Path:
-        """Return the file that is locked during compilation."""
         return Path(self._cache_file._index_path).with_suffix(".lock")  # noqa: SLF001
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -136,7 +132,6 @@ def folders() -> list[Path]:
 
 
 def folder_to_write() -> Path | None:
-    """Return the folder that new machine code goes to."""
     return next(filter(_can_be_written, folders()), None)
 
 

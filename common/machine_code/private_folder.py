@@ -7,7 +7,7 @@ from tempfile import gettempdir
 
 
 def private_folder() -> Path | None:
-    """Return this user's temporary folder, or `None`. As its code is executed, only the user may write to it."""
+    """Return this user's temporary folder, if only the user may write to it: its code is executed."""
     try:
         folder = Path(gettempdir()) / f"colibri-{os.getuid()}"
         folder.mkdir(0o700, exist_ok=True)

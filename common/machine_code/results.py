@@ -1,7 +1,6 @@
 """Compilation results on disk, loaded without numba's front end.
 
-numba itself imports its compiler and SciPy before it loads the first kernel, and parses intermediate code that only the
-compilation of a caller needs.
+numba itself imports its compiler and SciPy first, and parses code that only the compilation of a caller needs.
 """
 
 from collections.abc import Callable
@@ -35,7 +34,7 @@ class _Kept(NamedTuple):
 
 
 class Results(CompileResultCacheImpl, _CacheLocator):
-    """Writer and reader of compilation results for numba, in a folder and under a key."""
+    """Writer and reader of compilation results for numba."""
 
     def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
         self._py_file, self._lineno = function.__code__.co_filename, function.__code__.co_firstlineno
@@ -52,7 +51,7 @@ class Results(CompileResultCacheImpl, _CacheLocator):
     get_disambiguator = get_source_stamp
 
     def drop_unused(self, for_s: float) -> None:
-        """Delete files of this kernel's other versions that were not read for this time before the last one written."""
+        """Delete files of this kernel's other versions that were not read for this time."""
         files = {file: file.stat() for file in self._folder.glob(f"{escape(self._prefix)}*")}
         before_s = max((it.st_mtime for it in files.values()), default=0.0) - for_s
         for file, it in files.items():

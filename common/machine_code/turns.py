@@ -1,4 +1,4 @@
-"""Turns of processes at the same work: one does it while the others wait, and no signal interrupts it."""
+"""Turns of processes at the same work: one does it while the others wait."""
 
 import fcntl
 import os
@@ -14,7 +14,7 @@ _held: list[int] = []
 
 
 class Turn:
-    """The right to do some work, by a lock on a file, until `end` or the end of the process."""
+    """The right to do some work, by a lock on a file."""
 
     def __init__(self, file: Path, waiting: Callable[[], object]) -> None:
         self._holds = self._within_another = False
@@ -33,7 +33,7 @@ class Turn:
             raise
 
     def hold_signals(self) -> None:
-        """Deliver signals until `end` only: an exception of their handlers would be lost in a callback of C."""
+        """Deliver signals only at `end`: a callback of C would lose an exception of their handlers."""
         within_another = bool(_handlers)
         try:
             _deliver()
@@ -60,7 +60,7 @@ def _hold(number: int, _frame: object) -> None:
 
 
 def _deliver() -> None:
-    """Restore the handlers, and call those of the signals that came meanwhile."""
+    """Restore the handlers, and call those of pending signals."""
     for number, handler in _handlers.items():
         signal.signal(number, handler)
     _handlers.clear()

@@ -1,4 +1,4 @@
-"""`failure.txt` in a flight's folder: the reason of an early end, with the traceback of foreign code."""
+"""`failure.txt` in a flight's folder: the reason of an early end."""
 
 from contextlib import suppress
 from pathlib import Path

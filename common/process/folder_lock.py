@@ -12,7 +12,7 @@ class FolderInUseError(Error):
 
 
 class FolderLock:
-    """An exclusive lock on a folder, released by the system when the process ends."""
+    """An exclusive lock on a folder until the end of the process."""
 
     def __init__(self, folder: Path, option: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Process life cycle: errors, exit codes, quick end, one thread, no garbage-collection pauses."""
+"""Process life cycle: errors, exit codes, quick end, garbage collection."""
 
 import atexit
 import gc
@@ -19,13 +19,13 @@ _MOST_NUDGE_M = 100.0
 
 
 def use_one_thread() -> None:
-    """Limit linear algebra, before numpy is loaded: at a dozen states further threads only take cores."""
+    """Limit linear algebra to one thread, before numpy is loaded."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def use_safe_path() -> None:
-    """Keep the working directory, with possible namesakes, off the module path of child processes."""
+    """Keep the working directory off the module path of child processes."""
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
@@ -54,10 +54,7 @@ def loading() -> Iterator[None]:
 
 @contextmanager
 def gc_frozen() -> Iterator[None]:
-    """Exclude all existing objects from garbage collection, to save flight time.
-
-    Collecting their garbage would add 0.15 s to every start.
-    """
+    """Exclude all existing objects from garbage collection, to save flight time."""
     ours = not gc.get_freeze_count()
     if ours:
         gc.freeze()
@@ -70,7 +67,7 @@ def gc_frozen() -> Iterator[None]:
 
 
 def freeze_once() -> None:
-    """Freeze all objects at the first call; later calls collect the garbage of previous flights."""
+    """Freeze all objects at the first call; later calls collect garbage."""
     if gc.get_freeze_count():
         gc.collect()
     else:
@@ -98,14 +95,13 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def handle_endings(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
-    """Handle Ctrl-C, `kill` and a closed terminal, unless `nohup` has excluded the last."""
+    """Handle Ctrl-C, `kill` and a closed terminal, unless under `nohup`."""
     for number in _ENDING:
         if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> NoReturn:
-    """Raise KeyboardInterrupt for any signal that ends a process."""
     raise KeyboardInterrupt(number)
 
 
@@ -118,7 +114,7 @@ def fail_interrupted(interrupt: KeyboardInterrupt, kept: str = "") -> NoReturn:
 
 @contextmanager
 def one_line(code: int = EXIT_BAD_INPUT, kept: str = "") -> Iterator[None]:
-    """End with one line on an `Error`, and on an interruption if there is something `kept` to tell."""
+    """End with one line on an `Error`, and on an interruption if there is something `kept`."""
     try:
         yield
     except Error as error:
@@ -130,7 +126,7 @@ def one_line(code: int = EXIT_BAD_INPUT, kept: str = "") -> Iterator[None]:
 
 
 def end_with(parent: int) -> None:
-    """End this process with its parent. Call it before anything can block; `Stop` then ends it in order."""
+    """End this process with its parent. Call it before anything can block."""
 
     def look(*_signal: object) -> None:
         if os.getppid() != parent:
@@ -147,17 +143,10 @@ def end_with(parent: int) -> None:
 
 
 class Stop:
-    """True once the process should end: on SIGINT, SIGTERM, SIGHUP, or the parent's death.
-
-    Attributes:
-        code: The exit code by then: 128 plus the signal's number.
-    """
+    """True once the process should end: on SIGINT, SIGTERM, SIGHUP, or the parent's death."""
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
-        """Handle signals; with `starting` they end the process at once until the first check.
-
-        The parent passes its own id: it may die before this process reads it.
-        """
+        """Handle signals; with `starting` they end the process at once until the first check."""
         self.code = 0
         self._starting = starting
         self._parent = parent

@@ -15,7 +15,7 @@ class LogError(InFlightError):
 
 
 def set_aside(*paths: Path) -> None:
-    """Rename finished logs, with one free number for all: flight.ulg becomes flight-1.ulg."""
+    """Rename finished logs, with one number for all: flight.ulg becomes flight-1.ulg."""
     number = 1
     while any(_numbered(path, number).exists() for path in paths):
         number += 1
@@ -60,7 +60,7 @@ class LogFile:
 
 
 class BlockLog(LogFile):
-    """A file written `BLOCK` records at a time: a killed process loses those since the last block."""
+    """A file written `BLOCK` records at a time: a killed process loses the last ones."""
 
     BLOCK = 64
 

@@ -1,4 +1,4 @@
-"""Output that an unread pipe or a stopped terminal does not hold up."""
+"""Output that never waits for its reader."""
 
 import atexit
 import io
@@ -16,10 +16,7 @@ _LEFT_OUT = "colibri: {} lines dropped: the output was not read\n"
 
 
 class Output(io.RawIOBase):
-    """A file descriptor that never waits for its reader; unread output is buffered.
-
-    Beyond `_MOST_BYTES` the oldest lines are dropped, and counted at the end.
-    """
+    """A file descriptor that never waits for its reader; unread output is buffered, beyond `_MOST_BYTES` dropped."""
 
     def __init__(self, number: int, *, left_out: str = _LEFT_OUT, patient: bool = False) -> None:
         self._number, self._left_out_text, self._patient = number, left_out, patient
@@ -49,7 +46,7 @@ class Output(io.RawIOBase):
         return len(data)
 
     def finish(self) -> None:
-        """Wait a moment for the reader of what is left; a forked process leaves it to its parent."""
+        """Wait a moment for the reader; a forked process leaves that to its parent."""
         if self._process != os.getpid():
             return
         if self._left_out:
@@ -94,7 +91,7 @@ def finish_outputs() -> None:
 
 
 def _opened_again(number: int) -> int | None:
-    """Open a pipe or terminal a second time: `O_NONBLOCK` on the first would be its other users', too."""
+    """Open a pipe or terminal again: `O_NONBLOCK` on the first would affect its other users."""
     if stat.S_ISFIFO(os.fstat(number).st_mode) or os.isatty(number):
         with suppress(OSError):
             return os.open(f"/proc/self/fd/{number}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
@@ -108,7 +105,7 @@ def text_output(output: Output, encoding: str = "utf-8") -> io.TextIOWrapper:
 def use_streams() -> None:
     """Escape what the streams cannot encode; standard error waits for no reader.
 
-    Closed streams (`>&-`) become the null device: else a later file would take their number.
+    Closed streams become the null device: else a later file would take their number.
     """
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:

@@ -1,4 +1,4 @@
-"""A log file with several concurrent writers; the system keeps appended blocks whole."""
+"""A log file with several concurrent writers; appended blocks stay whole."""
 
 import fcntl
 from contextlib import suppress
@@ -9,10 +9,10 @@ from colibri.common.process.log_files import LogError, LogFile
 
 
 class SharedLog(LogFile):
-    """A log that continues while any process has it open, for restarted autopilots."""
+    """A log that continues while any process has it open."""
 
     def __init__(self, path: Path, beginning: bytes, *, goes_on: bool = False) -> None:
-        """Open the file; write `beginning` if it is new; `goes_on` keeps the content in any case."""
+        """Open the file; write `beginning` if it is new; `goes_on` keeps the content."""
         super().__init__(path, "ab")
         try:
             is_alone = _is_alone(self._file.fileno())
@@ -32,7 +32,7 @@ def remove_unused(path: Path) -> None:
 
 
 def _is_alone(file: int) -> bool:
-    """Return whether the file is open here only, and then lock others out; `False` without file locks."""
+    """Lock others out if the file is open here only; `False` without file locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -44,6 +44,5 @@ def _is_alone(file: int) -> bool:
 
 
 def share(file: int) -> None:
-    """Mark an open file as one with several writers."""
     with suppress(OSError):
         fcntl.flock(file, fcntl.LOCK_SH)

@@ -1,7 +1,7 @@
 """A file of two slots that survives a crash at any instant with the last complete write.
 
-Slots are written alternately with number and checksum, each by one call, so the system has it at once: only a power
-failure may lose more. A mapped file would be faster by 1 µs, and end the process where another program truncates it.
+Slots are written alternately, each by one call with number and checksum. A mapped file would be faster by 1 µs, and end
+the process where another program truncates it.
 """
 
 import os
@@ -21,7 +21,7 @@ class Slots:
     """The newest content, on disk."""
 
     def __init__(self, path: Path) -> None:
-        """Open or create the file. All of it is written, so that the disk has room for it."""
+        """Open or create the file, and write all of it: so the disk has room."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = regular(str(path), os.O_RDWR | os.O_CREAT)
         content = os.read(self._file, 2 * SLOT + 1)

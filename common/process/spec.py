@@ -36,7 +36,6 @@ class Starter(NamedTuple):
 
 
 def add_process_options(parser: ArgumentParser) -> None:
-    """Add the options for programs that start this process."""
     add = parser.add_argument
     add("--json", action="store_true", help="status as JSON lines on standard output")
     add("--parent", type=int, metavar="PID", help="end when that process, which started this one, ends")

@@ -11,7 +11,7 @@ _LEFT_OUT = '{{"event": "left_out", "text": "{0} lines dropped: the output was n
 
 
 class Status:
-    """Reports status as text on standard error, or JSON lines on standard output."""
+    """Reports status as text on standard error, or JSON on standard output."""
 
     def __init__(self, name: str, *, as_json: bool) -> None:
         self._name = name
@@ -19,10 +19,7 @@ class Status:
         self._stream: TextIO | None = None
 
     def take_standard_output(self, *, patient: bool) -> None:
-        """Reserve standard output for status; redirect other output to standard error.
-
-        A `patient` process waits for its reader before it ends.
-        """
+        """Reserve standard output for status; a `patient` process waits for its reader at the end."""
         self._stream = text_output(Output(os.dup(1), left_out=_LEFT_OUT, patient=patient))
         os.dup2(2, 1)
 

@@ -7,7 +7,6 @@ from colibri.common.machine_code.private_folder import private_folder
 
 
 def use_writable_folders() -> None:
-    """Move matplotlib's cache to the private folder if the home is read-only."""
     if os.environ.get("MPLCONFIGDIR"):
         return
     try:

@@ -84,7 +84,7 @@ class Client:
         only: int = 0,
         all_components: bool = False,
     ) -> None:
-        """Create a component of MAV_TYPE `kind`; by default it receives all systems, but only autopilots."""
+        """Create a component of MAV_TYPE `kind`; by default it receives only autopilots, of all systems."""
         self.source = (system, component)  # own system and component id
         self.vehicles: dict[int, RemoteVehicle] = {}  # by system id
         self._codec = Codec(system, component)
@@ -105,7 +105,7 @@ class Client:
         self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0)
 
     def begin(self, conversation: Talk) -> Talk:
-        """Queue a conversation: its first request is sent at the next poll when its lane is free."""
+        """Queue a conversation: its first request is sent when its lane is free."""
         self._lanes.setdefault((conversation.target, conversation.lane), []).append(conversation)
         return conversation
 

@@ -1,8 +1,7 @@
-"""Estimation of the vehicle's clock offset and of round-trip time by TIMESYNC.
+"""Estimation of the vehicle's clock offset by TIMESYNC: https://mavlink.io/en/services/timesync.html.
 
-The quickest of recent exchanges gives the offset, as delay disturbs the others (clock filter of RFC 5905, section 10).
-An older exchange must be quicker by the possible drift since. A significant drift (of simulators, percents) is
-compensated. https://mavlink.io/en/services/timesync.html
+The quickest of recent exchanges gives the offset (clock filter of RFC 5905, section 10). An older exchange must be
+quicker by the possible drift since. A significant drift, as of simulators, is compensated.
 """
 
 from collections import deque
@@ -51,7 +50,7 @@ class VehicleClock:
 
     @property
     def rate(self) -> float:
-        """Return the rate of the vehicle's clock relative to the own, over the last second; 1 if unknown."""
+        """Return the rate of the vehicle's clock relative to the own; 1 if unknown."""
         if len(self._answers) < _RATED:
             return 1.0
         (began_us, began), (ended_us, ended) = self._answers[0], self._answers[-1]
@@ -104,10 +103,7 @@ class VehicleClock:
 
 
 def drift_of(exchanges: Iterable[Exchange]) -> float:
-    """Return the relative drift of the vehicle's clock, positive if fast; 0 if insignificant.
-
-    The median slope between exchanges half the window apart (Theil and Sen).
-    """
+    """Return the relative drift of the vehicle's clock, positive if fast, by Theil and Sen; 0 if insignificant."""
     told = tuple(exchanges)
     half = len(told) // 2
     if len(told) < _LEAST_EXCHANGES:

@@ -39,7 +39,7 @@ class Command(Conversation):
 
 
 class CommandInt(Command):
-    """A COMMAND_INT with up to four parameters, a MAV_FRAME, and a place in its units."""
+    """A COMMAND_INT; its place is in the units of the MAV_FRAME."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Base of all conversations with a vehicle: a request, repeated until answered, and its result."""
+"""Base of all conversations with a vehicle."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
@@ -24,7 +24,7 @@ USUALLY = Repeat()
 
 
 class Conversation(ABC):
-    """A request to a vehicle and its course until the result."""
+    """A request to a vehicle, repeated until the result."""
 
     answers: ClassVar[frozenset[str]]  # names of messages
 
@@ -59,7 +59,7 @@ class Conversation(ABC):
 
     @abstractmethod
     def _request(self) -> Sequence[Encoded]:
-        """Return the current request; `_sent` counts its transmissions including this one."""
+        """Return the current request; `_sent` counts it."""
 
     def _go_on(self) -> None:
         self._sent, self._due_us = 0, _AT_ONCE

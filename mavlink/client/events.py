@@ -9,7 +9,7 @@ from colibri.mavlink.errors import MavlinkError
 
 
 class EventError(MavlinkError):
-    """An event is unknown or has an invalid value, or the flight cannot have it."""
+    """An event is unknown, invalid, or impossible in this flight."""
 
 
 class TimedEvent(

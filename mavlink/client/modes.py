@@ -1,4 +1,4 @@
-"""Flight modes of PX4 (shared by Colibri) and ArduPilot's copters: names and numbers on the wire."""
+"""Flight modes of PX4 (shared by Colibri) and ArduPilot's copters."""
 
 from typing import NamedTuple
 

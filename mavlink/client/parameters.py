@@ -1,7 +1,6 @@
 """Parameters of a vehicle, read, set and listed: https://mavlink.io/en/services/parameter.html.
 
-Every value travels in a 32-bit float. Integers are copied into it byte by byte (PX4, Colibri; `by_bits` here) or
-converted to a number (ArduPilot).
+A value travels in a 32-bit float: integers byte by byte (`by_bits`: PX4, Colibri) or as a number (ArduPilot).
 """
 
 from collections.abc import Sequence
@@ -46,7 +45,7 @@ def held_in(message: Message, *, by_bits: bool = True) -> Held:
 
 
 def on_wire(value: Value, kind: int, *, by_bits: bool = True) -> Bits | float:
-    """Return a value, integers rounded, as in PARAM_SET; raise `ValueError` if the type cannot hold it."""
+    """Return a value as in PARAM_SET, integers rounded; raise `ValueError` if the type cannot hold it."""
     layout = _LAYOUTS.get(kind)
     if layout is None or (not by_bits and kind != _REAL):
         return float(round(value))
@@ -128,7 +127,7 @@ class SetParameter(ReadParameter):
 
 
 class ListParameters(Conversation):
-    """Read all parameters into `held` by name; lost ones are requested one by one."""
+    """Read all parameters into `held`; lost ones are requested one by one."""
 
     answers = frozenset({"PARAM_VALUE"})
 

@@ -32,7 +32,7 @@ class _PlanConversation(Conversation):
 
 
 class Upload(_PlanConversation):
-    """An upload: the vehicle requests each item, then accepts or refuses the plan."""
+    """An upload: the vehicle requests each item."""
 
     answers = frozenset({"MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"})
 

@@ -1,4 +1,4 @@
-"""A vehicle's reports beside its state: mode, arming, battery, estimator, fence, home."""
+"""A vehicle's reports: mode, arming, battery, estimator, fence, home."""
 
 from dataclasses import dataclass, field
 from math import nan

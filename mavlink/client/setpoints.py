@@ -1,7 +1,4 @@
-"""Setpoints and sticks from SI, ENU and FLU to the wire; without acknowledgement.
-
-Field layouts: common.xml, POSITION_TARGET_TYPEMASK, ATTITUDE_TARGET_TYPEMASK, MANUAL_CONTROL.
-"""
+"""Setpoints and sticks from SI, ENU and FLU to the wire: messages of common.xml."""
 
 from math import pi
 
@@ -46,7 +43,7 @@ def position_target(
 def attitude_target(
     target: Target, attitude: Quaternion | None = None, rates: Vector | None = None, *, thrust: float, time_us: int = 0
 ) -> Encoded:
-    """Return an attitude (FLU to ENU) or body rates (FLU, rad/s) with a thrust of 0..1; missing ones are masked."""
+    """Return an attitude (FLU to ENU) or body rates (FLU, rad/s); missing ones are masked."""
     mask = _NO_ATTITUDE * (attitude is None) | _NO_RATES * (rates is None)
     q = _LEVEL if attitude is None else ned_frd_from_enu_flu(attitude)
     return "SET_ATTITUDE_TARGET", (_ms(time_us), *target, mask, q, *frd_from_flu(rates or _STILL), thrust)

@@ -1,4 +1,4 @@
-"""The vehicle's state from telemetry: ODOMETRY, or separate messages for attitude and position."""
+"""The vehicle's state from ODOMETRY, or from messages of attitude and position."""
 
 from math import isfinite
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSIT
 
 
 class TimedState(NamedTuple):
-    """The vehicle's own estimate of its state, in its local frame."""
+    """The vehicle's own estimate, in its local frame."""
 
     vehicle_us: int  # by the vehicle's clock
     position_enu_m: Vector

@@ -1,7 +1,7 @@
-"""The messages of a DataFlash log, as bytes.
+"""The messages of a DataFlash log: https://ardupilot.org/dev/docs/logmessages.html.
 
-Specification: https://ardupilot.org/dev/docs/logmessages.html. A message is two marks, its number and fields without
-gaps. The log itself defines each message (FMT), the units and multipliers of its columns (FMTU, UNIT, MULT).
+A message is two marks, its number and fields without gaps. The log itself defines messages (FMT), units and multipliers
+(FMTU, UNIT, MULT).
 """
 
 from collections.abc import Callable, Sequence
@@ -66,7 +66,6 @@ def message(name: str, *values: Value) -> bytes:
 
 
 def beginning(time_us: int) -> bytes:
-    """Return the definitions that a log begins with."""
     formats = [
         message("FMT", number, _struct(each.fields).size + _HEAD_BYTES, each.name, each.fields, each.columns)
         for number, each in _FORMATS.items()

@@ -96,7 +96,6 @@ class DataFlashRecorder:
                 self._add("ERR", now_us, subsystem, failed(s))
 
     def _fix(self, s: TelemetrySnapshot) -> tuple[Value, ...]:
-        """Return a row of GPS: the receiver's fix, or the state under state feedback."""
         week = week_ms = 0
         if self._boot_unix_us:
             week, week_ms = divmod((self._boot_unix_us + s.time_us - _GPS_EPOCH_US) // 1000, _WEEK_MS)
@@ -110,7 +109,7 @@ class DataFlashRecorder:
         return (0, kind, week_ms, week, seen, DILUTION_E2 / 100, *where, hypot(east, north), course, -up, 0.0, True)
 
     def _add_row(self, name: str, row: _Row, s: TelemetrySnapshot) -> None:
-        """Add a row; one of numbers that have no value, as those of a lost vehicle, is omitted."""
+        """Add a row; one without valid numbers is omitted."""
         with suppress(ArithmeticError, ValueError):
             values = row(s)
             if values:
@@ -194,7 +193,6 @@ def _motors(s: TelemetrySnapshot) -> tuple[Value, ...]:
 
 
 def _inertial(s: TelemetrySnapshot) -> tuple[Value, ...]:
-    """Return a row of IMU: measured, or of the state under state feedback."""
     if s.sensed is None:
         east, north, up = s.acceleration_enu_m_s2
         force, rate = in_body_frd(s.attitude, (east, north, up + STANDARD_GRAVITY_M_S2)), s.rate_frd

@@ -19,7 +19,7 @@ class LogNames(NamedTuple):
         return f"{number:0{self.digits}}{self.suffix}"
 
     def number(self, name: str) -> int:
-        """Return the number in a log's name, 0 for another file."""
+        """Return the number in a log's name; 0 for another file."""
         number = name.removesuffix(self.suffix)
         return int(number) if name != number and number.isascii() and number.isdigit() else 0
 

@@ -1,7 +1,7 @@
 """Files in a folder on disk.
 
-Paths are walked name by name from the folder's own handle without following links, so files outside are unreachable.
-Only regular files and folders are shown.
+Paths are walked name by name without following links, so files outside are unreachable. Only regular files and folders
+are shown.
 """
 
 import os
@@ -64,7 +64,7 @@ def _refusing(
 
 
 class Folder:
-    """Files in a folder on disk, see `Files`; other writers are not expected."""
+    """Files in a folder on disk, without other writers."""
 
     def __init__(self, path: Path, quota: Quota = DEFAULT_QUOTA) -> None:
         path.mkdir(parents=True, exist_ok=True)

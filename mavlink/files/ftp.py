@@ -1,12 +1,11 @@
-"""The file transfer protocol: a ground station lists, reads and writes the vehicle's files.
+"""The file transfer protocol of the vehicle: https://mavlink.io/en/services/ftp.html.
 
-Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice, or clients deviate:
+Choices where the specification leaves them, or clients deviate:
 
-- The client chooses the session number (PX4 and MAVSDK only support 0; MAVProxy picks a fresh one for each transfer).
-  So sessions are per client, and every answer echoes the request's session.
-- Each channel may have few sessions, whatever ids it sends. Where all are taken, the one with most loses its oldest.
-- A client that reopens a session number after a moment's idleness has lost track of it and takes it over; before, it is
-  refused.
+- The client chooses the session number (PX4 and MAVSDK only use 0), so sessions are per client, and every answer echoes
+  the number.
+- Each channel may have few sessions. Where all are taken, the channel with most loses its oldest.
+- A client that reopens a session number after a moment's idleness takes it over; before, it is refused.
 - MAVSDK repeats a request with a new sequence number, so operations are idempotent where possible.
 """
 
@@ -133,7 +132,7 @@ class Ftp:
         return sends
 
     def _changed(self, request: Request) -> Send:
-        """Make a change once, however often the identical request is repeated (Timeouts/Resending)."""
+        """Make a change once, however often the identical request is repeated."""
         asked = (request.peer, request.payload)
         if asked in self._remembered:
             return self._remembered[asked][1]
@@ -155,7 +154,7 @@ class Ftp:
                 del self._remembered[asked]
 
     def _close(self, key: Key) -> None:
-        """Close a session, and forget its answers, as the next client may repeat the same requests."""
+        """Close a session and forget its answers: the next client may repeat the requests."""
         self._sessions.pop(key, None)
         self._bursts.pop(key, None)
         for peer, payload in list(self._remembered):
@@ -246,7 +245,7 @@ class Ftp:
         return session
 
     def _read(self, request: Request) -> Outcome:
-        """Read part of a file; a burst continues meanwhile, as clients fill its gaps like this."""
+        """Read part of a file; a burst continues meanwhile."""
         session = self._used(request)
         if session is None or session.reading is None:
             return Nak(FtpError.INVALID_SESSION)

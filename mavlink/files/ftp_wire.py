@@ -1,7 +1,4 @@
-"""Wire format of the file transfer protocol: requests, answers, errors, folder listings.
-
-Specification: https://mavlink.io/en/services/ftp.html, "Payload Format" and following.
-"""
+"""Wire format of the file transfer protocol: https://mavlink.io/en/services/ftp.html."""
 
 from enum import IntEnum
 from errno import EINVAL, EIO, EISDIR, ENOSPC, ENOTDIR, ENOTEMPTY
@@ -120,7 +117,7 @@ _NAKS = {
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:
-    """Return a folder's entry in a listing; an unlistable one is "S" (skip), to keep later entries' numbers."""
+    """Return an entry's line in a listing; "S" (skip) if unlistable, to keep later entries' numbers."""
     name = entry.name.encode(errors="replace")
     kind = b"D" if entry.is_folder else b"F"
     facts = b"\t%d\t%d" % (entry.size, entry.modified_s) if with_time else b"\t%d" % entry.size

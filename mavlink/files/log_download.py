@@ -1,8 +1,7 @@
-"""Flight logs: listed, downloaded and erased.
+"""Flight logs: listed, downloaded and erased by LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122).
 
-Specification: messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html.
-Logs are the files of one folder sorted by name; a log's id is its index in the client's last list, counted from 0 as
-in PX4 or from 1 as in ArduPilot.
+Logs are the files of one folder by name; a log's id is its index in the client's last list, from 0 as in PX4 or from 1
+as in ArduPilot.
 """
 
 from collections import deque
@@ -60,7 +59,7 @@ class Logs:
         suffix: str = "",
         first_id: int = 0,
     ) -> None:
-        """Serve the files that end in `suffix`; `being_written` returns the name of the one that is not erased."""
+        """Serve the files that end in `suffix`; that of `being_written` is not erased."""
         self._files, self._budget = files, budget or Budget()
         self._suffix, self._first_id = suffix, first_id
         self._folder = folder
@@ -167,7 +166,7 @@ class Logs:
 
 
 def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:
-    """Yield the next blocks; if the log ends with a full one, an empty one marks the end."""
+    """Yield the next blocks; an empty one marks the end after a full one."""
     wanted = min(maximum * BLOCK_BYTES, transfer.end - transfer.offset)
     data = transfer.reading.read(transfer.offset, wanted)
     if isinstance(data, FileRefusal):

@@ -1,4 +1,4 @@
-"""The vehicle's files as ground stations see them: an interface without I/O, and its composition.
+"""The vehicle's files as ground stations see them.
 
 Invalid names, offsets and data are refused; these classes never raise.
 """
@@ -41,8 +41,6 @@ class OpenFile(NamedTuple):
 
 
 class Quota(NamedTuple):
-    """Limits of bytes, and of files and folders."""
-
     size: int
     entries: int
 
@@ -99,7 +97,7 @@ Generator: TypeAlias = Callable[[str], bytes]
 
 
 class Tree:
-    """Generated (read-only) files, mounted folders, aliases of folders, and a root for the rest, in one tree."""
+    """Generated (read-only) files, mounted folders, aliases, and a root for the rest, in one tree."""
 
     def __init__(
         self,

@@ -1,7 +1,7 @@
-"""Step messages: all datagrams of stepped ground stations and a vehicle at one time, exchanged between processes.
+"""Step messages: all datagrams of stepped ground stations and a vehicle at one time.
 
 Stations' datagrams come with each frame of the plant, the vehicle's with its answer: so every datagram arrives at a
-definite frame, however slow either process is.
+definite frame.
 """
 
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ MAX_PARCEL_BYTES = 4096  # longer datagrams are cut, as by a link
 
 
 class Parcel(NamedTuple):
-    """A datagram from or to a ground station, by number."""
+    """A datagram from or to a numbered ground station."""
 
     station: int
     datagram: bytes
 
 
 class StepMessage(NamedTuple):
-    """All datagrams of one time in one direction; mode and arming only from the vehicle."""
+    """All datagrams of one time in one direction; mode and arming from the vehicle."""
 
     time_us: int
     parcels: Sequence[Parcel]
@@ -32,7 +32,7 @@ class StepMessage(NamedTuple):
 
 
 def packets(step_message: StepMessage) -> list[bytes]:
-    """Return a step message as at most 255 packets that fit datagrams; raise `ValueError` if it needs more."""
+    """Return a step message as at most 255 packets; raise `ValueError` if it needs more."""
     time_us, parcels, custom_mode, armed = step_message
     content = _HEAD.pack(time_us, custom_mode, armed, len(parcels))
     for station, whole in parcels:

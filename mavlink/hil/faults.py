@@ -1,8 +1,7 @@
-"""Faults by the names of MAV_CMD_INJECT_FAILURE, and the meaning of each one's numbers.
+"""Faults by MAV_CMD_INJECT_FAILURE: https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE.
 
-param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1, or 0 for all:
-https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE. param4 to param7 are defined by `TABLE`; 0 and nan
-are not given. A part has one fault at a time: a new one replaces it, OK ends it.
+param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1, or 0 for all; `TABLE` defines param4 to
+param7, where 0 and nan are not given. A new fault of a part replaces the last, OK ends it.
 """
 
 from collections.abc import Collection, Mapping
@@ -145,7 +144,7 @@ def short_unit_name(unit: int) -> str:
 
 
 def number_of(enum: str, given: str | int) -> int:
-    """Return the number of a FAILURE_UNIT or FAILURE_TYPE given by number or short name; raise `ValueError`."""
+    """Return the number of a FAILURE_UNIT or FAILURE_TYPE; raise `ValueError` for an unknown name."""
     if isinstance(given, int):
         return given
     known = {
@@ -170,7 +169,7 @@ def fault_from(p1: float, p2: float, p3: float, values: FaultValues) -> Fault | 
 
 
 def judged(fault: Fault, parts: Collection[Equipment], motors: int = MOTORS) -> Fault | Refusal:
-    """Return a fault with all its numbers, or the refusal for a plant with these `parts` and so many motors."""
+    """Return a fault with all its numbers, or its refusal by a plant with these `parts`."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
         return Refusal("no plant does this fault", RESULT_UNSUPPORTED)

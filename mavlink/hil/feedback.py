@@ -1,4 +1,4 @@
-"""The plant's output to the autopilot, by its word on the command line."""
+"""The plant's output to the autopilot."""
 
 from enum import StrEnum
 

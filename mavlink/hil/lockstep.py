@@ -54,14 +54,14 @@ def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custo
 def is_another(
     sender: Address | None, peer: Address | None, silence_s: float, is_there: Callable[[Address], bool]
 ) -> bool:
-    """Whether to refuse a sender, as the peer that shook hands before it is still there."""
+    """Whether to refuse a sender, as the peer is still there."""
     if peer is None or sender == peer or silence_s >= PEER_GIVEN_UP_AFTER_S:
         return False
     return silence_s < PEER_LOST_AFTER_S or is_there(peer)
 
 
 class AnsweringEnd:
-    """What the autopilot's ends of all protocols share: it remembers the last answer."""
+    """Common parts of the autopilot's ends, which remember the last answer."""
 
     def __init__(self, system_id: int, received_s: float, call_at_s: float) -> None:
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)

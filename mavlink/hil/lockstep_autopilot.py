@@ -18,7 +18,7 @@ _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
 class AutopilotEnd(AnsweringEnd):
-    """The autopilot's end: calls the plant, returns each new frame once, remembers the last answer."""
+    """The autopilot's end: calls the plant, returns each new frame once."""
 
     def __init__(
         self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
@@ -73,11 +73,11 @@ class AutopilotEnd(AnsweringEnd):
         return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
     def follow(self, time_us: int) -> None:
-        """Go on from the frame of a time that was answered without a datagram."""
+        """Go on from a frame that was answered without a datagram."""
         self._time_us = time_us
 
     def skip(self) -> None:
-        """Count an answer that was not encoded, so that later ones are numbered as if it had been."""
+        """Count an answer that was not encoded, for the numbers of later ones."""
         self._codec.skip(1)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:

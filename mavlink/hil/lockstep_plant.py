@@ -41,7 +41,7 @@ class PlantEnd:
         rotors: int = ROTORS,
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
-        """Begin without autopilot; `is_there` tells whether a program has the address of a silent one."""
+        """Begin without autopilot; `is_there` tells whether a silent one still has its address."""
         self.waits = waits  # or runs freely
         self._rotors = rotors
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
@@ -129,15 +129,14 @@ class PlantEnd:
         return command
 
     def skip(self) -> None:
-        """Count a frame that was not encoded, so that later ones are numbered as if it had been."""
+        """Count a frame that was not encoded, for the numbers of later ones."""
         self._codec.skip(state.STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
 
     def encoded(self, frame: SensorFrame) -> bytes:
-        """Return the datagram of a frame for records alone."""
         return b"".join(encode_sensors(self._codec, frame))
 
     def take_faults(self) -> list[Fault | WorldChange]:
-        """Return the unchecked faults and changes of the world in the last answer."""
+        """Return the unchecked faults and changes in the last answer."""
         faults, self._faults = self._faults, []
         return faults
 

@@ -1,4 +1,4 @@
-"""The plant's messages beside a frame: battery, results of requested faults, the delay of commands."""
+"""The plant's messages beside a frame: battery, results of faults, delay of commands."""
 
 from collections.abc import Sequence
 from math import nan
@@ -50,7 +50,7 @@ class ReceivedFrame(NamedTuple):
 
 
 def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
-    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell; no cell without a battery."""
+    """Encode a battery as BATTERY_STATUS: the pack as its first cell, or no cell."""
     voltage_mv = min(round(1e3 * battery.voltage_v), _MAX_MV) if battery.exists else _NO_CELL
     voltages = (voltage_mv, *(_NO_CELL,) * 9)
     kind = (0, mav.MAV_BATTERY_FUNCTION_ALL, mav.MAV_BATTERY_TYPE_LIPO, _UNKNOWN_TEMPERATURE)

@@ -1,10 +1,10 @@
 """PX4's simulator interface, the autopilot's end, as a state machine without I/O.
 
-It sends a HEARTBEAT twice a second, as a simulator restarts after three seconds without. Each HIL_SENSOR is answered by
-a HIL_ACTUATOR_CONTROLS of the same time that requests lockstep. Time counts from the first frame.
+It sends a HEARTBEAT twice a second. Each HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS of the same time that
+requests lockstep. Time counts from the first frame.
 
-Quirks of jMAVSim: its HIL_GPS follows the HIL_SENSOR of the same time and belongs to the next; old versions leave
-`fields_updated` empty, which counts as all new.
+Quirks of jMAVSim: its HIL_GPS belongs to the next HIL_SENSOR; an empty `fields_updated` of old versions counts as all
+new.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,8 +26,6 @@ _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER |
 
 
 class FlierEnd(AnsweringEnd):
-    """The autopilot's end: returns each new frame once, remembers the last answer."""
-
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[PerRotor], PerRotor]) -> None:
         super().__init__(system_id, now_s - ANSWER_AGAIN_AFTER_S, now_s)
         self._to_motors = to_motors

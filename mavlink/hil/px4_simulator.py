@@ -1,11 +1,10 @@
 """PX4's simulator interface, the simulator's end, as a state machine without I/O.
 
-PX4 calls (over TCP it is the client), begins with a HEARTBEAT and, before or after, requests HIL_STATE_QUATERNION.
-HIL_SENSOR sets its clock; its HIL_ACTUATOR_CONTROLS with bit 0 of `flags` answers it. Until the first such answer,
-while PX4 is starting, the simulator advances at the pace of the wall clock; then it waits for each answer. An answer
-counts if its time differs from the previous one's, as a repeated frame may be answered twice.
+PX4 calls, begins with a HEARTBEAT and may request HIL_STATE_QUATERNION. HIL_SENSOR sets its clock; its
+HIL_ACTUATOR_CONTROLS with bit 0 of `flags` answers. Until the first such answer, while PX4 starts, the simulator
+advances with the wall clock; then it waits for each. An answer counts if its time differs from the previous one's.
 
-Source: PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and https://docs.px4.io/main/en/simulation/.
+Source: PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp.
 """
 
 from collections import Counter
@@ -47,7 +46,7 @@ class Motors(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """The true state for HIL_STATE_QUATERNION, with coordinate acceleration: PX4 only logs it."""
+    """The true state for HIL_STATE_QUATERNION, with coordinate acceleration."""
 
     state: StateFrame
     place: Geodetic
@@ -56,8 +55,6 @@ class Truth(NamedTuple):
 
 
 class SimulatorEnd:
-    """The simulator's end: offers frames, receives motor commands."""
-
     def __init__(self, *, system_id: int, rotors: int = ROTORS) -> None:
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._controls, self._stopped = actuator_frame(rotors), Motors((0.0,) * rotors, armed=False)

@@ -1,8 +1,8 @@
 """Sensor frames from plant to autopilot, in SI, ENU/FLU, and their messages of PX4's simulator interface.
 
-HIL_SENSOR has the on-board measurements, with the new groups in `fields_updated`. HIL_GPS has its own rate and is
-delayed; further sensors are rows of `OWN_MESSAGES`. Units and frames: https://docs.px4.io/main/en/simulation/ and
-https://mavlink.io/en/messages/common.html. Values are unchecked: an autopilot must cope with broken sensors.
+HIL_SENSOR has the on-board measurements, HIL_GPS its own rate and delay; further sensors are rows of `OWN_MESSAGES`.
+Units and frames: https://docs.px4.io/main/en/simulation/. Values are unchecked: an autopilot must cope with broken
+sensors.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ _altitude_m = lru_cache(maxsize=1)(altitude_m)  # pressure is measured less ofte
 
 
 class Updated:
-    """Groups of HIL_SENSOR.fields_updated as plain numbers: `enum` flags would dominate the time per frame."""
+    """Groups of HIL_SENSOR.fields_updated as plain numbers: `enum` flags are too slow."""
 
     ACCELEROMETER = 0x7
     GYROSCOPE = 0x38
@@ -72,7 +72,7 @@ class Distance(NamedTuple):
 
 
 class SensorFrame(NamedTuple):
-    """On-board measurements at one instant; groups that are not `updated` hold old values or zeros."""
+    """On-board measurements at one instant; groups that are not `updated` are old or zero."""
 
     time_us: int
     updated: int  # bits of `Updated`
@@ -117,7 +117,7 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
 
 
 def sensors_as_received(frame: SensorFrame) -> SensorFrame | None:
-    """Return a frame of HIL_SENSOR alone as rounded by its message; None with others beside it."""
+    """Return a frame of HIL_SENSOR alone as rounded by its message; None for others."""
     time_us, updated, force, rate, field, pressure_pa, temperature_c, gps, distance = frame
     if gps is not None or distance is not None:
         return None
@@ -128,7 +128,7 @@ def sensors_as_received(frame: SensorFrame) -> SensorFrame | None:
 
 
 def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
-    """Read a datagram of one HIL_SENSOR of `source`, full length, and possibly a HIL_GPS; otherwise `None`."""
+    """Read a full-length HIL_SENSOR of `source`, possibly with a HIL_GPS; otherwise `None`."""
     layout, fix = _BY_SIZE.get(len(datagram)), None
     if layout is None:
         layout = _BY_SIZE.get(len(datagram) - _GPS.size)
@@ -195,7 +195,7 @@ def _accuracy_m(cm: int) -> float:
 
 
 def _distance_fields(measured: Distance, time_us: int) -> tuple[Any, ...]:
-    """Return DISTANCE_SENSOR, cm, of a downward laser; quality 1 ("invalid") if out of range."""
+    """Return DISTANCE_SENSOR of a downward laser; quality 1 ("invalid") if out of range."""
     sees = isfinite(measured.distance_m)
     limits_cm = (_in(measured.min_m, 1e2, 65534), _in(measured.max_m, 1e2, 65534))
     distance_cm = _in(measured.distance_m, 1e2, 65535) if sees else limits_cm[1] + 1

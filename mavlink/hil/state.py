@@ -1,6 +1,6 @@
 """State frames and commands between plant and autopilot, in SI, ENU/FLU, and their MAVLink messages.
 
-Invalid input (not finite, out of range, halves of different frames) decodes to `None`.
+Invalid input decodes to `None`.
 """
 
 from array import array
@@ -46,7 +46,7 @@ class StateFrame(NamedTuple):
 
 
 class ActuatorCommand(NamedTuple):
-    """Rotor speeds in answer to the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
+    """Rotor speeds in answer to the frame of `time_us`, 0..1 of the maximum."""
 
     time_us: int
     controls: PerRotor
@@ -59,7 +59,7 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
-    """Return the frame as rounded by `encode_state` and `read_state`: a sign or another axis alters no digit."""
+    """Return the frame as rounded by `encode_state` and `read_state`."""
     time_us, position, velocity, attitude, rate = frame
     numbers = _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
     return _frame(time_us - time_us % 1000, _SINGLES.unpack(numbers))

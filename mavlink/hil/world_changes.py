@@ -1,7 +1,4 @@
-"""In-flight changes of the plant's world, as COMMAND_LONG: mean wind, payload, pace.
-
-They come with the answer to a frame, as faults do, so repeated answers have no effect.
-"""
+"""In-flight changes of the plant's world, as COMMAND_LONG appended to the answer to a frame."""
 
 from math import isfinite
 from typing import Any, NamedTuple, TypeAlias
@@ -29,8 +26,6 @@ class PayloadChange(NamedTuple):
 
 
 class PaceChange(NamedTuple):
-    """A new pace of the simulation relative to real time."""
-
     speed: float
 
 

@@ -1,4 +1,4 @@
-"""The interface of a link to ground stations, and its common parts."""
+"""The interface of links to ground stations, and their common parts."""
 
 import os
 from collections import deque
@@ -18,7 +18,7 @@ give_way = getattr(os, "sched_yield", lambda: None)
 
 
 class LinkError(MavlinkError):
-    """A link cannot be opened or used; the message is the line for the user."""
+    """A link cannot be opened or used."""
 
 
 class GroundLink(Protocol):
@@ -40,7 +40,7 @@ class GroundLink(Protocol):
     def wait(self, timeout_s: float) -> None: ...
 
     def take_opened(self) -> list[Address]:
-        """Return new addresses to send to: the called one, or those that connected."""
+        """Return new addresses to send to."""
 
     def take_closed(self) -> list[Address]: ...
 

@@ -1,7 +1,7 @@
-"""Endpoints by URL.
+"""Endpoints by URL; all raise `LinkError`.
 
 `udpin:HOST:PORT` waits for any sender, `udpout:HOST:PORT` exchanges datagrams with that address only; `tcpin:HOST:PORT`
-waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. All raise `LinkError`.
+waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port.
 """
 
 import os
@@ -54,7 +54,7 @@ def beyond_loopback(url: str) -> bool:
 
 
 def calls_this_computer(url: str) -> bool:
-    """Whether an endpoint exchanges datagrams with one address only, of this computer."""
+    """Whether an endpoint has one peer only, on this computer."""
     return url.startswith(("udpout:", "tcp:")) and not beyond_loopback(url)
 
 

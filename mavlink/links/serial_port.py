@@ -1,7 +1,7 @@
 """A serial port as a non-blocking endpoint, reopened when its device returns.
 
-Broken frames are dropped; beyond the line's speed, whole datagrams are dropped. pyserial only opens the port: its
-`write` blocks on a stalled device.
+Beyond the line's speed, whole datagrams are dropped. pyserial only opens the port: its `write` blocks on a stalled
+device.
 """
 
 import errno
@@ -92,7 +92,7 @@ class SerialLink(Endpoint):
         return self._port is not None
 
     def _read(self) -> bytes:
-        """Return a chunk of input; `in_waiting` fails if the device has gone, a plain read would return nothing."""
+        """Return a chunk of input; `in_waiting` fails if the device has gone."""
         if self._port is None:
             return b""
         try:

@@ -33,7 +33,7 @@ def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) 
 
 
 def report_compiling(status: Status) -> None:
-    """Report to people once, to programs with the number of functions. Loads numba."""
+    """Report to people once, to programs each function. Loads numba."""
     from colibri.common.jit import on_compile
 
     def report(functions: int) -> None:

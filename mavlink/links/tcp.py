@@ -1,7 +1,7 @@
-"""Non-blocking TCP endpoints, server and client, for whole frames. A slow reader loses frames, as over UDP.
+"""Non-blocking TCP endpoints for whole frames. A slow reader loses frames, as over UDP.
 
-Any web page can have the browser post bytes to a port of this computer, or send what it likes after a TLS handshake.
-So nothing is read from a stream that begins like HTTP or TLS, or that brings no frame in its first `FIRST_BYTES`.
+Any web page can have the browser post bytes to a port of this computer. So nothing is read from a stream that begins
+like HTTP or TLS, or that brings no frame in its first `FIRST_BYTES`.
 """
 
 import re
@@ -32,7 +32,7 @@ _TLS = re.compile(rb"\x16\x03")
 
 
 class Connection:
-    """A connected socket with framing and a send queue; `refused` says what its stream is instead of MAVLink."""
+    """A connected socket; `refused` says what its stream is instead of MAVLink."""
 
     def __init__(self, sock: socket.socket, address: Address) -> None:
         sock.setblocking(False)
@@ -157,7 +157,7 @@ class TcpServer(Endpoint):
                 self._opened.append(address)
 
     def _has_room(self) -> bool:
-        """Make room for a client, if it must be: who never spoke goes first, then who has been silent for longest."""
+        """Make room for a client if needed: the one that never spoke, or is silent for longest, goes."""
         if len(self._connections) < CONNECTIONS:
             return True
         idle = min(self._connections.values(), key=lambda connection: connection.spoke_s or 0.0)
@@ -262,10 +262,7 @@ def _named(address: Address) -> str:
 
 
 def _established(sock: socket.socket, address: Address) -> Connection | None:
-    """Return the connection of a completed call, unless it failed or connected to itself.
-
-    A call to an unused port of the own host may be given just that port.
-    """
+    """Return the connection of a completed call, unless it failed or connected to itself, as to an unused own port."""
     try:
         if sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or sock.getsockname() == sock.getpeername():
             return None

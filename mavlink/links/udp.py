@@ -20,7 +20,7 @@ _DATAGRAMS_AT_ONCE = 64  # limit per call, so that a continuous sender cannot st
 
 
 class UdpLink(Endpoint):
-    """A UDP socket, polled for `spin_s` before sleeping; with a `target`, other senders are dropped."""
+    """A UDP socket, polled for `spin_s` before sleeping; only a `target`'s datagrams are received."""
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
         super().__init__(url, target)
@@ -39,7 +39,7 @@ class UdpLink(Endpoint):
         self._opened = [target]
 
     def keep_to(self, peer: Address) -> None:
-        """Have Linux drop what other ports send before it is queued, so that no flood delays the peer's answers."""
+        """Have Linux drop other ports' datagrams, so that no flood delays the peer's."""
         self.kept = peer
         if sys.platform == "linux":
             load_port, is_peers = (0x28, 0, 0, 0), (0x15, 0, 1, peer[1])
@@ -124,7 +124,7 @@ class UdpLink(Endpoint):
 
 
 def _connect(sock: socket.socket, target: Address) -> bool:
-    """Connect to a loopback target, which saves a fifth of an exchange; other routes may change."""
+    """Connect to a loopback target, which saves a fifth of an exchange."""
     if not ip_address(target[0]).is_loopback:
         return False
     sock.connect(target)
@@ -132,7 +132,7 @@ def _connect(sock: socket.socket, target: Address) -> bool:
 
 
 def is_bound(address: Address) -> bool:
-    """Whether a program of this computer has the address: it lives, however long it is silent."""
+    """Whether a program of this computer has the address."""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(address)

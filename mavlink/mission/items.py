@@ -1,7 +1,4 @@
-"""Mission items with unchanged values, so that a download equals the upload.
-
-Specification: https://mavlink.io/en/services/mission.html, "Mission Items" and "Detecting Mission/Plan Changes".
-"""
+"""Items of missions, unchanged between upload and download: https://mavlink.io/en/services/mission.html."""
 
 from collections.abc import Sequence
 from math import isfinite, isnan
@@ -52,7 +49,7 @@ NO_PLAN = StoredPlan()
 
 
 def plan_of(items: Sequence[MissionItem]) -> StoredPlan:
-    """Return the plan of these items. Its id is their CRC-32, or 1 if that is 0."""
+    """Return the plan of these items; its id is their CRC-32, never 0."""
     if not items:
         return NO_PLAN
     return StoredPlan(tuple(items), crc32(b"".join(_PACKED.pack(*item) for item in items)) or 1)
@@ -77,7 +74,7 @@ def plan_name(plan_type: int) -> str:
 
 
 def fault_of(item: MissionItem, result: int) -> str:
-    """Name the field, and its value, for which an item is refused with a MAV_MISSION_RESULT."""
+    """Name the field and value for which an item is refused with a MAV_MISSION_RESULT."""
     name = command_name(item.command)
     if result == mav.MAV_MISSION_UNSUPPORTED:
         return f"{name} is not supported"
@@ -108,5 +105,5 @@ def _whole(value: float, scale: float) -> int | None:
 
 
 def behind(item: MissionItem, items: int) -> MissionItem:
-    """Return an item of a plan before which `items` were put, or taken away if negative: a jump's target moves."""
+    """Return an item moved behind `items` others, or before them if negative: a jump's target moves."""
     return item._replace(p1=item.p1 + items) if item.command == mav.MAV_CMD_DO_JUMP else item

@@ -1,7 +1,4 @@
-"""The mission microservice: plans up and down, the current item, progress.
-
-Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans.
-"""
+"""The mission microservice of mission, geofence and rally points: https://mavlink.io/en/services/mission.html."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite, isnan
@@ -55,7 +52,7 @@ class Downloads:
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
     def item(self, peer: Peer, plan_type: int, seq: int, newest: StoredPlan, current: int, now_us: int) -> Send | None:
-        """Return an item, if there is one, also for the deprecated MISSION_REQUEST as MISSION_ITEM_INT."""
+        """Return an item, if there is one, always as MISSION_ITEM_INT."""
         reading = self._readings.get((peer, plan_type))
         plan = newest
         if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
@@ -98,7 +95,7 @@ class MissionVehicle(NamedTuple):
 class MissionService:
     """Holds the three plans and serves the mission protocol: one method per message.
 
-    With `MissionVehicle.home`, clients count the items of a mission from 1, and item 0 is home.
+    With `MissionVehicle.home`, clients count a mission's items from 1, and item 0 is home.
     """
 
     def __init__(
@@ -187,7 +184,7 @@ class MissionService:
         return tuple(self.plans[plan_type].id for plan_type in PLAN_TYPES)
 
     def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
-        """Hold plans kept over a restart, without loading them into the vehicle."""
+        """Hold plans kept over a restart, without loading them."""
         self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
 
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
@@ -197,7 +194,7 @@ class MissionService:
         return plan
 
     def _store(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
-        """Load an uploaded plan, without home and with jumps to items as the vehicle counts them."""
+        """Load an uploaded plan as the vehicle counts: without home."""
         if plan_type == MISSION and self._offset:
             items = [behind(item, -self._offset) for item in items[self._offset :]]
         return self.load(plan_type, items)

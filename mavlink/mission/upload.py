@@ -1,10 +1,9 @@
 """Uploads of plans: the vehicle requests each item and replaces the old plan by a complete, valid one.
 
-Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to the Vehicle", "Canceling Operations",
-"Timeouts and Retries". Two choices follow PX4, because clients rely on them:
+Specification: https://mavlink.io/en/services/mission.html. Two choices follow PX4, because clients rely on them:
 
-- Requests are repeated every 250 ms for five seconds. The recommended five retries would let two of three uploads of
-  500 items fail over a link that loses a fifth of the datagrams each way.
+- Requests are repeated every 250 ms for five seconds. Five retries would let two of three uploads of 500 items fail
+  over a link that loses a fifth of the datagrams each way.
 - Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent.
 """
 
@@ -53,7 +52,7 @@ class _Upload:
         first: int = 0,
         replaces: Sequence[MissionItem] = (),
     ) -> None:
-        """Take `count` items from number `first` on; of a part, `replaces` has the items of the whole plan."""
+        """Take `count` items from number `first` on; of a part, `replaces` is the whole plan."""
         self.first, self.replaces = first, replaces
         self.peer = peer
         self.began_us = began_us  # also of those that the channel began and replaced
@@ -100,7 +99,7 @@ class _Upload:
 
 
 class Uploads:
-    """The uploads in progress, at most one per type and per ground station."""
+    """The uploads in progress, one per type and ground station."""
 
     def __init__(
         self,
@@ -110,7 +109,7 @@ class Uploads:
         unchecked_first: bool = False,
         old_form: bool | None = None,
     ) -> None:
-        """Store plans by `store`; `unchecked_first` accepts any item 0 of a mission, `old_form` asks in it first."""
+        """Store plans by `store`; `unchecked_first` accepts any item 0 of a mission."""
         self._rules, self._unchecked_first, self._first_form = rules, unchecked_first, old_form
         self._store = store
         self._under_way: dict[int, _Upload] = {}
@@ -128,10 +127,7 @@ class Uploads:
         first: int = 0,
         replaces: Sequence[MissionItem] = (),
     ) -> Send:
-        """Handle a MISSION_COUNT: a repeated one restarts; another station's upload is finished first.
-
-        With `replaces`, the items from `first` on replace those of this plan.
-        """
+        """Handle a MISSION_COUNT: a repeated one restarts; another station's upload is finished first."""
         other = self._under_way.get(plan_type)
         began_us = other.began_us if other is not None and other.peer.channel == peer.channel else now_us
         if other is not None and other.peer != peer:
@@ -195,7 +191,7 @@ class Uploads:
         self._schedule()
 
     def hush(self, peer: Peer) -> None:
-        """End the peer's uploads silently if they time out: it has begun another transfer."""
+        """End the peer's uploads silently if they time out."""
         for upload in self._under_way.values():
             upload.quiet |= upload.peer == peer
 
@@ -228,7 +224,7 @@ class Uploads:
         return self._end(upload, result, plan_id, now_us)
 
     def take_reason(self) -> str:
-        """Return why something was refused since the last call; empty if nothing was."""
+        """Return why something was refused since the last call, or ""."""
         reason, self._reason = self._reason, ""
         return reason
 

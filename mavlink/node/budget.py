@@ -1,13 +1,13 @@
-"""The work that a vehicle does for ground stations, limited by its cost."""
+"""The work that a vehicle does for ground stations."""
 
 SHARE = 0.25  # part of simulated time: the control law needs the rest at real time
 MAX_SAVED_US = 2_000.0
 
 
 class Budget:
-    """Work in µs, estimated by whoever does it: with measured times no flight would be repeated bit by bit.
+    """Work in µs, estimated: with measured times no flight would repeat bit by bit.
 
-    Work begins while anything is left. What it costs beyond that is earned before the next work begins.
+    Work begins while anything is left; excess is earned before the next work begins.
     """
 
     def __init__(self) -> None:

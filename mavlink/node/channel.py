@@ -9,7 +9,7 @@ _SEQUENCES = 256
 
 
 class Channel:
-    """Numbering, packing and counting of the traffic with one remote address."""
+    """Numbering, packing and counting of the traffic with one address."""
 
     def __init__(self, number: int, link: int, address: Address | None, codec: Codec, now_us: int) -> None:
         self.number = number

@@ -1,4 +1,4 @@
-"""The hub of all links: checks and routes messages, dispatches them to services, sends their answers."""
+"""The hub of all links: checks, routes and dispatches messages, sends answers."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
@@ -37,7 +37,7 @@ KEY_REFUSED = (
 
 
 class Outgoing(NamedTuple):
-    """A datagram and its link's number; without an address, the link chooses it."""
+    """A datagram and its link's number; without address, the link chooses."""
 
     link: int
     address: Address | None
@@ -68,10 +68,7 @@ class Hub:
         warn: Callable[[str], None] | None = None,
         budget: Budget | None = None,
     ) -> None:
-        """Create a component; without `caught` services' exceptions are raised.
-
-        Messages beyond the `budget` wait, and are handled in turn of the channels by `work`.
-        """
+        """Create a component; `caught` takes services' exceptions, messages beyond the `budget` wait for `work`."""
         self._budget = budget or Budget()
         self.waiting: dict[int, deque[Message]] = {}
         self._own = (system_id, component_id)
@@ -136,7 +133,7 @@ class Hub:
             self._take_in(message, channel, owner)
 
     def work(self, now_us: int) -> None:
-        """Handle the messages that wait, one of each channel in turn, as far as the budget allows."""
+        """Handle waiting messages, one of each channel in turn, within the budget."""
         self._now_us = now_us
         while self.waiting and self._budget.allows(now_us):
             number = next(iter(self.waiting))
@@ -163,7 +160,7 @@ class Hub:
             self._forget_silent()
 
     def send(self, sends: Iterable[Send]) -> int:
-        """Send messages, each to one channel or to all; return how many were encoded."""
+        """Send messages; return how many were encoded."""
         sent = 0
         for name, fields, number in sends:
             if number is None:

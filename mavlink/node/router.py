@@ -53,7 +53,7 @@ def _leads_to(target: Source, sources: dict[Source, None]) -> bool:
 
 
 def target_of(fields: object) -> Source:
-    """Return the target's system and component id, 0 for all; MANUAL_CONTROL has a field of its own for it."""
+    """Return the target's system and component id, 0 for all."""
     system = getattr(fields, "target_system", None)
     if system is None:
         return getattr(fields, "target", 0), 0

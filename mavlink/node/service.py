@@ -1,7 +1,7 @@
 """The interface of a microservice: messages and the simulated time in, messages out.
 
-A service receives only messages of other components to this component or to all. Field values are unchecked: NaN,
-infinities, unknown enumerations and wrong counts must be refused, and never raise.
+A service receives messages to this component or to all. Field values are unchecked: NaN, infinities, unknown
+enumerations and wrong counts must be refused, and never raise.
 """
 
 from collections import Counter
@@ -15,7 +15,7 @@ Fields: TypeAlias = tuple[Any, ...]
 
 
 class Peer(NamedTuple):
-    """A sender, with the number of its channel (a remote address on a link)."""
+    """A sender, on the channel of that number."""
 
     channel: int
     system: int
@@ -23,7 +23,7 @@ class Peer(NamedTuple):
 
 
 def first_to_go(peers: Iterable[Peer]) -> Peer:
-    """Return the first peer of the channel that has most, so that no channel pushes out the others."""
+    """Return the first peer of the channel that has most: no channel pushes out the others."""
     waiting = list(peers)
     ((channel, _),) = Counter(peer.channel for peer in waiting).most_common(1)
     return next(peer for peer in waiting if peer.channel == channel)

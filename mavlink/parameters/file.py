@@ -1,7 +1,4 @@
-"""Parameter files in QGroundControl's text format.
-
-A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, separated by tabs; `#` begins a comment.
-"""
+"""Parameter files in QGroundControl's text format."""
 
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, float32

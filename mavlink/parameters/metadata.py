@@ -1,7 +1,4 @@
-"""The component metadata protocol: https://mavlink.io/en/services/component_metadata.html.
-
-The files are fetched by FTP. Their version is 1, the only one that QGroundControl supports.
-"""
+"""The component metadata protocol, over FTP: https://mavlink.io/en/services/component_metadata.html."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -22,7 +19,7 @@ _UINT32_MAX = 0xFFFFFFFF
 
 
 class Metadata:
-    """Description of this component; the general file lists the others with their checksums."""
+    """Description of this component in a general file and a file of its parameters."""
 
     def __init__(self, parameters: bytes) -> None:
         self._parameters = parameters

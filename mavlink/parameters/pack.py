@@ -46,7 +46,7 @@ def packed(parameters: Parameters, query: str = "") -> bytes | None:
 
 
 def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
-    """Return type, lengths, and the part of the name that is new, at least a character."""
+    """Return type, lengths, and the part of the name that is new."""
     maximum = min(len(before), len(parameter.name) - 1, _MAX_COMMON_CHARS)
     common = next((i for i in range(maximum) if before[i] != parameter.name[i]), maximum)
     own = parameter.name[common:].encode()

@@ -1,7 +1,6 @@
 """The parameter microservice of the vehicle: https://mavlink.io/en/services/parameter.html.
 
-Values are encoded bytewise, as PX4's (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE), or every number as a float, as
-ArduPilot's (MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT).
+Values are encoded bytewise, as PX4's, or every number as a float, as ArduPilot's.
 """
 
 from collections.abc import Iterable, Iterator
@@ -119,11 +118,7 @@ class ParameterService:
 
 
 def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamError:
-    """Return the value of a PARAM_SET.
-
-    Clients of the packed file (MAVProxy), or without types (DroneKit), send integers as REAL32 and expect conversion
-    (https://mavlink.io/en/services/parameter_ftp.html). Other types must match.
-    """
+    """Return the value of a PARAM_SET; integers may come as REAL32, as from MAVProxy and DroneKit."""
     if wire_type not in tuple(ParamType):
         return ParamError.TYPE_UNSUPPORTED
     value = value_of(ParamType(wire_type), bits)
@@ -135,7 +130,7 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamErr
 
 
 def _number(definition: Parameter, bits: int) -> Value | ParamError:
-    """Return the number of a PARAM_SET that is a float whatever its type says; integers are rounded."""
+    """Return the number of a PARAM_SET that is a float whatever its type says."""
     value = value_of(ParamType.REAL, bits)
     if definition.kind == ParamType.REAL:
         return value

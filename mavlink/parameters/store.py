@@ -1,4 +1,4 @@
-"""Parameters of a vehicle: definitions and values, in two types of 32 bits on the wire."""
+"""Parameters of a vehicle: definitions and values of 32 bits."""
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -39,7 +39,7 @@ class ParamError(IntEnum):
 
 
 class Prepared(NamedTuple):
-    """An accepted change, with the object built to validate it (reused when adopted), if any."""
+    """An accepted change, with the object built to validate it, if any."""
 
     made: object | None = None
 
@@ -94,9 +94,9 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters sorted by name, and their values; `prepare` is called before a change.
+    """The parameters sorted by name, and their values; `prepare` may refuse a change.
 
-    `initial` values replace defaults, which stay those of the definitions; `links` return what follows from a change.
+    `initial` values replace defaults; `links` return what follows from a change.
     """
 
     def __init__(
@@ -161,7 +161,7 @@ class Parameters:
         return wanted if isinstance(wanted, ParamError) else self._try({name: wanted})
 
     def propose(self, name: str, value: Value) -> ParamError | bool:
-        """Propose a change for `settle`; return the refusal of an invalid one, or whether it changes anything."""
+        """Propose a change for `settle`; return the refusal, or whether it changes anything."""
         wanted = self._wanted(name, value)
         if isinstance(wanted, ParamError):
             return wanted
@@ -174,7 +174,7 @@ class Parameters:
         return True
 
     def settle(self) -> None:
-        """Do a slice of work for a batch of proposed changes; of a refused one, try the halves at the next calls."""
+        """Do a slice of work for a batch of proposed changes; halve a refused one."""
         batch = self.proposed[0]
         self._begun = self._ready is not None and not self._ready(batch, {**self._values, **batch})
         if self._begun:

@@ -146,7 +146,7 @@ class CommandService:
         return [_ack(number, peer, result), *self._reason(Refusal(f"{command_name(number)} {why}", result), now_us)]
 
     def _obey(self, handler: Handler, command: ReceivedCommand, confirmation: int) -> list[Send]:
-        """Execute a command unless it is a repetition after a lost answer, or another is in progress."""
+        """Execute a command unless it is repeated after a lost answer, or another is in progress."""
         running = self._running.get(command.id)
         if running is not None:
             if running.command.peer == command.peer and _parameters(running.command) == _parameters(command):

@@ -1,8 +1,7 @@
-"""The autopilot's identity.
+"""The autopilot's identity: its conventions on the wire.
 
-Ground stations adapt to MAV_AUTOPILOT. As `px4` or `ardupilot` they offer all features of these, as `generic` only
-common ones. AUTOPILOT_VERSION and a text at the start name Colibri. The services read their conventions here; those of
-modes, commands and parameters are in `autopilot/identities`.
+Ground stations adapt to MAV_AUTOPILOT: for `px4` or `ardupilot` they offer all features, for `generic` common ones.
+AUTOPILOT_VERSION and a text at the start name Colibri.
 """
 
 from dataclasses import dataclass
@@ -73,10 +72,7 @@ def version_of(text: str) -> Triple:
 
 
 def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fields:
-    """Return the fields of AUTOPILOT_VERSION (148).
-
-    Versions are never marked as official: ground stations would offer an update to PX4's latest.
-    """
+    """Return AUTOPILOT_VERSION (148), never marked as official: ground stations would offer an update."""
     major, minor, patch = version
     own = _packed(version)
     custom = (patch, minor, major, *PRODUCT[:5])

@@ -1,7 +1,4 @@
-"""Messages to set origin, home and mode, the latter two superseded by commands but still in use.
-
-SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the same integers, as MAVSDK expects.
-"""
+"""Messages to set origin, home and mode; the latter two are superseded by commands but still in use."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -19,8 +16,6 @@ SET_MODE_ID = 11
 
 
 class Setters(NamedTuple):
-    """Handlers of the messages. `mode` takes base mode and custom mode."""
-
     origin: Callable[[Geodetic], Refusal | None]
     home: Callable[[Geodetic], Refusal | None]
     mode: Callable[[int, int], Refusal | None]

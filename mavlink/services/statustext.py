@@ -1,8 +1,4 @@
-"""STATUSTEXT (253): a line for users, in chunks if long.
-
-Text beyond 50 bytes continues in further messages with the same non-zero id, counted by chunk_seq; a chunk that is not
-full ends it.
-"""
+"""STATUSTEXT (253): a line for users, in chunks of 50 bytes; one that is not full ends it."""
 
 from collections import deque
 from typing import NamedTuple

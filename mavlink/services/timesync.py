@@ -1,7 +1,4 @@
-"""The timesync and ping microservices; the vehicle's clock is simulated time.
-
-Specifications: mavlink.io/en/services/timesync.html and mavlink.io/en/services/ping.html.
-"""
+"""The timesync and ping microservices: mavlink.io/en/services/timesync.html, mavlink.io/en/services/ping.html."""
 
 from collections.abc import Iterable
 

@@ -1,7 +1,7 @@
-"""Services of streamed setpoints, and arbitration between clients of the same kind.
+"""Services of streamed setpoints, and arbitration between their clients.
 
-The first client that streams is obeyed until it is silent for a time-out; then the next one that streams. A client that
-engages the stream's mode takes over, if it streams. Equal ids on two links are two clients.
+The first client that streams is obeyed until it is silent; then the next one. A client that engages the stream's mode
+takes over, if it streams. Equal ids on two links are two clients.
 """
 
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ Value = TypeVar("Value")
 
 
 class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an error of this program)
-    """An invalid setpoint: the reason under which it is counted, and the field with its value if senders are told."""
+    """An invalid setpoint: the reason, by which it is counted, and the field to be told."""
 
     def __init__(self, reason: str, field: str = "") -> None:
         super().__init__(reason)
@@ -29,10 +29,7 @@ class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an err
 
 
 class StreamedService(ABC, Generic[Value]):
-    """Keeps each client's latest setpoint and obeys that of `source`; only refusals are told, with `text`.
-
-    `taken` is called with each setpoint of the source, and with None for an invalid one.
-    """
+    """Keeps each client's latest setpoint and obeys that of `source`; `text` tells refusals."""
 
     handles: frozenset[str]
 
@@ -46,7 +43,7 @@ class StreamedService(ABC, Generic[Value]):
         self.taken: Callable[[Value | None], None] | None = None
 
     def refusal(self, now_us: int) -> str:
-        """Return why the latest setpoint was refused; empty if none was of late."""
+        """Return why the latest setpoint was refused; empty if none was."""
         at_us, why = self._refusal
         return why if now_us - at_us <= self._silent_after_us else ""
 

@@ -1,7 +1,4 @@
-"""Follow-me: the target's state from FOLLOW_TARGET, https://mavlink.io/en/messages/common.html#FOLLOW_TARGET.
-
-Of `est_capabilities` only the position bit is required: clients omit the others. (0, 0, 0) is an unknown velocity.
-"""
+"""Follow-me: the target's state from FOLLOW_TARGET. Zero is an unknown velocity."""
 
 from math import hypot, isfinite, isnan
 from typing import Any

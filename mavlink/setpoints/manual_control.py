@@ -1,7 +1,7 @@
 """Manual control: a ground station's sticks, as MANUAL_CONTROL (69) or RC_CHANNELS_OVERRIDE (70).
 
-Specification: https://mavlink.io/en/services/manual_control.html and common.xml. Yaw is positive to the right, as in
-PX4 and its clients, although the message's text is counter-clockwise. Buttons are ignored.
+Specification: https://mavlink.io/en/services/manual_control.html. Yaw is positive to the right, as in PX4, although the
+message's text is counter-clockwise. Buttons are ignored.
 """
 
 from collections.abc import Sequence

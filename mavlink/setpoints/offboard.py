@@ -1,9 +1,7 @@
-"""The offboard microservice: setpoints streamed by a client.
+"""The offboard microservice: setpoints streamed by a client, https://mavlink.io/en/services/offboard_control.html.
 
-Specification: https://mavlink.io/en/services/offboard_control.html, and common.xml's MAV_FRAME,
-POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. An invalid setpoint is counted and dropped with a STATUSTEXT, and
-does not keep a stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
-Choices left open by the specification:
+An invalid setpoint is counted and dropped with a STATUSTEXT. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control
+law commands rotors. Choices left open by the specification:
 
 - NaN counts as masked, as in PX4: x and y of a group together, z alone.
 - Undefined bits of a type mask are ignored.

@@ -1,7 +1,7 @@
-"""A radio with channels: those of the transmitter, which clients override.
+"""A radio's channels, which clients override as in ArduPilot.
 
-RC_CHANNELS_OVERRIDE (70) as in ArduPilot: 0 releases a channel, 65535 leaves it, an override lapses after
-RC_OVERRIDE_TIME, and only the ground station of SYSID_MYGCS is obeyed. MANUAL_CONTROL (69) overrides channels 1 to 4.
+Of RC_CHANNELS_OVERRIDE (70), 0 releases a channel, 65535 leaves it; an override lapses after RC_OVERRIDE_TIME, and only
+the ground station of SYSID_MYGCS is obeyed. MANUAL_CONTROL (69) overrides channels 1 to 4.
 """
 
 from collections.abc import Mapping

@@ -11,10 +11,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class PositionSetpoint(NamedTuple):
-    """A setpoint of position and its derivatives; nan if not given.
-
-    An axis without position, velocity and acceleration is held by the vehicle; so is yaw without angle and rate.
-    """
+    """A setpoint of position and its derivatives; nan if not given. What has none of them is held."""
 
     position_enu_m: Vector = NOWHERE
     velocity_m_s: Vector = NOWHERE  # ENU; with `body`, FLU of a level vehicle
@@ -74,7 +71,7 @@ class TargetState(NamedTuple):
 
 
 def turned(flu: Vector, heading_rad: float) -> Vector:
-    """Return a vector ahead, left and up of `heading_rad` in ENU; unchanged if both horizontal parts are nan."""
+    """Return a vector ahead, left and up in ENU; unchanged if both horizontal parts are nan."""
     ahead, left, up = flu
     if isnan(ahead) and isnan(left):
         return flu

@@ -1,7 +1,4 @@
-"""The heartbeat microservice: HEARTBEAT at 1 Hz, and the time of the last ground station's.
-
-Specification: mavlink.io/en/services/heartbeat.html.
-"""
+"""The heartbeat microservice: mavlink.io/en/services/heartbeat.html."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Due times of messages per channel: a grid of simulated time for each, without drift and bursts."""
+"""Due times of messages per channel, without drift and bursts."""
 
 from heapq import heapify, heappop, heappush
 from typing import TypeAlias
@@ -23,7 +23,7 @@ class _Entry:
 
 
 class Schedule:
-    """Due keys; those of the same interval and phase are due together, whenever they were set."""
+    """Due keys; those of the same interval and phase are due together."""
 
     def __init__(self) -> None:
         self._entries: dict[Key, _Entry] = {}
@@ -53,7 +53,7 @@ class Schedule:
         return None if entry is None else entry.interval_us
 
     def due(self, now_us: int, at_most: int) -> list[Key]:
-        """Return keys due since the last call, each once, in order of their times; those beyond `at_most` wait."""
+        """Return keys due since the last call, in order of their times; those beyond `at_most` wait."""
         heap = self._heap
         if now_us < self._now_us:  # a new flight has begun
             self._rebuild(now_us)

@@ -1,8 +1,4 @@
-"""Streams: messages at each channel's rates, and on request.
-
-Specification: mavlink.io/en/mavgen_python/howto_requestmessages.html; MAV_CMD_SET_MESSAGE_INTERVAL (511),
-MAV_CMD_GET_MESSAGE_INTERVAL (510), MAV_CMD_REQUEST_MESSAGE (512) and the older REQUEST_DATA_STREAM (66).
-"""
+"""Streams: messages at each channel's rates, and on request."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
@@ -208,7 +204,7 @@ class StreamService:
 
 
 def _message_id(name: str) -> int:
-    """Return the id of a message; -2, which cannot be requested, if the dialect lacks it."""
+    """Return the id of a message; -2 if the dialect lacks it."""
     number: int = getattr(mav, f"MAVLINK_MSG_ID_{name}", -2)
     return number
 

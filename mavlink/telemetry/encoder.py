@@ -1,4 +1,4 @@
-"""Conversion of numbers to message fields, and quantities common to several messages."""
+"""Conversion of numbers to message fields."""
 
 from collections.abc import Callable, Sequence
 from math import degrees, isfinite, pi
@@ -25,7 +25,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:
-    """Return `encoder` with numbers clamped to the fields' types; messages with invalid ones are omitted."""
+    """Return `encoder` with numbers clamped to the fields' types; invalid messages are omitted."""
     kinds = definition_of(name).fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
 

@@ -43,7 +43,7 @@ class Blocks(ABC):
 
 
 class Turned:
-    """Columns of a table in other frames, converted together; `places` has the slice of each named result."""
+    """Columns of a table in other frames; `places` has the slice of each result."""
 
     def __init__(self, columns: Sequence[str], **vectors: tuple[Turn, str]) -> None:
         """Convert vectors of three columns each: `POSITION=(ned_from_enu, "x y z")`; several may share a name."""
@@ -72,6 +72,6 @@ def attitude_ned(attitude: Array) -> Array:
 
 
 def heading_from_yaw(yaw_rad: Array) -> Array:
-    """Return the heading, -pi to pi clockwise from north, of a yaw counter-clockwise from east."""
+    """Return the heading, -pi to pi clockwise from north, of an ENU yaw."""
     heading: Array = pi - np.remainder(pi / 2.0 + yaw_rad, 2.0 * pi)
     return heading

@@ -1,6 +1,6 @@
 """Colibri's own topics of a flight: tables in SI, ENU and FLU, kept to the last bit.
 
-The file's format, packing, reading, CSV columns and `docs/files.md` are derived from these tables.
+The file's format, CSV columns and `docs/files.md` are derived from them.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""The messages of a ULog file, as bytes.
-
-Specification: https://docs.px4.io/main/en/dev_log/ulog_file_format. A file is a header, the definitions, and from the
-first subscription on the data. A message is its size, type and content.
-"""
+"""The messages of a ULog file: https://docs.px4.io/main/en/dev_log/ulog_file_format."""
 
 from collections.abc import Mapping
 from struct import Struct

@@ -21,7 +21,7 @@ _KINDS = frozenset(b"BFIMPASDLCORQ")
 
 
 class LogFormatError(MavlinkError):
-    """The file is not a flight log; the message is the line for the user."""
+    """The file is not a flight log."""
 
 
 class FlightFile:

@@ -66,7 +66,7 @@ class Recorder:
         self._log.append(messages.SYNC + messages.parameters(changed))
 
     def _record_status(self, s: TelemetrySnapshot) -> None:
-        """Record a new status, or every second; with it the battery, and flush the log."""
+        """Record a new status, or every second, with the battery; then flush the log."""
         now_us = s.time_us
         status = VehicleStatus(s.armed, s.px4_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:

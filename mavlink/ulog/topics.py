@@ -1,7 +1,4 @@
-"""Topics of viewers: names, units and frames (NED, FRD) of PX4, each with part of its fields.
-
-Fields: https://docs.px4.io/main/en/msg_docs/. `mpc_status` is Colibri's: the decision as in `autopilot.csv`.
-"""
+"""Topics of viewers: names, units and frames of PX4, https://docs.px4.io/main/en/msg_docs/, with part of its fields."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -84,7 +81,7 @@ def _packer(topic: str) -> Callable[..., bytes]:
 
 
 def _fields(text: str) -> list[tuple[str, str, int]]:
-    """Return name, type and count of fields; consecutive ones of one type as one array, by the first's name."""
+    """Return name, type and count of fields; consecutive ones of one type are one array."""
     fields: list[tuple[str, str, int]] = []
     for field in text.split(";")[:-1]:
         kind, name = field.split()
@@ -113,9 +110,9 @@ def head(layout: "np.dtype[np.void]", number: int) -> tuple[int, int, int]:
 
 
 class Records:
-    """Data messages of some topics, one of each per row, with fields assigned for many rows at once.
+    """Data messages of some topics, assigned for many rows at once.
 
-    Consecutive fields of one type are assigned by the name of the first, (rows, fields).
+    Consecutive fields of one type are assigned by the first's name, (rows, fields).
     """
 
     def __init__(self, rows: int, *topics: str) -> None:

@@ -28,7 +28,7 @@ class TruthVehicle(NamedTuple):
 
 
 class TruthBlocks(Blocks):
-    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH` if there are more rotors."""
+    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH`, if any."""
 
     def __init__(self, vehicle: TruthVehicle) -> None:
         more = vehicle.rotors > ROTORS

@@ -71,18 +71,18 @@ class Message(NamedTuple):
 
 
 class Bits(NamedTuple):
-    """The bits of a float field: a Python float would change a signalling NaN."""
+    """The bits of a float field: Python changes a signalling NaN."""
 
     pattern: int
 
 
 def param_bits(message: Message) -> int:
-    """Return the bits of `param_value`: as a float, an integer's may be a signalling NaN, which Python changes."""
+    """Return the bits of `param_value`, where an integer's may be a signalling NaN."""
     return int.from_bytes(payload(message.frame)[: _PARAM_VALUE.size], "little")
 
 
 def payload(frame: bytes) -> bytes:
-    """Return the payload, possibly without trailing zeros, of a frame of MAVLink 1 or 2."""
+    """Return the payload, possibly without trailing zeros, of a frame."""
     start = _header_bytes(frame)
     return frame[start : start + frame[1]]
 
@@ -104,8 +104,7 @@ def intact(frame: bytes) -> bool | None:
 class Codec:
     """Encoder for one component, decoder for any; signatures are not checked.
 
-    MAVLink 2 frames, the only ones in flight, are read and written here, several times as fast as by pymavlink. MAVLink
-    1 and malformed input are left to pymavlink.
+    MAVLink 2 frames are read and written here, several times as fast as by pymavlink, which decodes all else.
     """
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
@@ -216,7 +215,7 @@ class _Layout:
         return self._fields._make(self._with_text(values) if self._texts else values)
 
     def _with_text(self, values: Sequence[Any]) -> list[Any]:
-        """Return the fields with text as by pymavlink: up to the first NUL, non-ASCII replaced."""
+        """Return the fields with text up to the first NUL, non-ASCII replaced."""
         fields = list(values)
         for i in self._texts:
             fields[i] = fields[i].split(b"\0", 1)[0].decode("ascii", "replace")
@@ -284,7 +283,7 @@ def _layout_named(name: str) -> _Layout:
 
 
 def _layout(message_id: int) -> _Layout | None:
-    """Return the layout of a message; unknown ids, which anyone may send, are not cached."""
+    """Return the layout of a message; unknown ids are not cached."""
     definition = mav.mavlink_map.get(message_id)
     return None if definition is None else _layout_named(definition.msgname)
 

@@ -1,7 +1,7 @@
 """Fast encoding and decoding of the messages in every frame of a flight.
 
-Such a message is unsigned, from one component, and has a fixed length, as its last field is hardly ever zero. One
-`Struct` reads header and payload into a tuple in wire order. Other forms are left to `Codec`.
+Such a message is unsigned, from one component, and of fixed length. One `Struct` reads header and payload into a tuple
+in wire order. Other forms are left to `Codec`.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ class FixedFrame:
         return frame + crc16(frame[1:] + self._crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
 
     def read(self, datagram: bytes, at: int, source: bytes) -> tuple[Any, ...] | None:
-        """Return the numbers of the frame at byte `at`; `None` unless it is an intact, unsigned one of `source`."""
+        """Return the numbers of the frame at byte `at`; `None` unless it is intact, unsigned and of `source`."""
         values = self._unpack_from(datagram, at)
         if values[0] != self._begins or values[2] != source or values[3] != self._id:
             return None

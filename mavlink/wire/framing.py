@@ -12,10 +12,7 @@ _OTHER_BYTES = 12
 
 
 class Framer:
-    """Splitter of a stream into frames with valid CRC; buffers at most one.
-
-    With unknown CRC, a frame must be followed by another or by silence.
-    """
+    """Splitter of a stream into frames with valid CRC. With unknown CRC, another frame or silence must follow."""
 
     def __init__(self) -> None:
         self._rest = b""

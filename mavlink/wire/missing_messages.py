@@ -1,8 +1,7 @@
 """Messages and fields that pymavlink's dialect lacks, as its generator would define them.
 
-Source: mavlink.io/en/messages/common.html, and ardupilotmega.html for ArduPilot's. CRC_EXTRA follows from the
-definition, so a mistake makes peers drop the message. Extension fields are not part of it: receivers cut or zero-fill
-them (mavlink.io/en/guide/serialization.html#message-extensions).
+Source: mavlink.io/en/messages/common.html, and ardupilotmega.html. CRC_EXTRA follows from the definition, so a mistake
+makes peers drop the message; extension fields are not part of it.
 """
 
 from re import findall

@@ -1,4 +1,4 @@
-"""Conversions between ENU/FLU and MAVLink's NED/FRD, used nowhere else; each is its own inverse."""
+"""Conversions between ENU/FLU and MAVLink's NED/FRD; each is its own inverse."""
 
 from math import sqrt
 from typing import TypeVar
@@ -22,6 +22,6 @@ def frd_from_flu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Nu
 
 
 def ned_frd_from_enu_flu(q: tuple[_Number, _Number, _Number, _Number]) -> tuple[_Number, _Number, _Number, _Number]:
-    """Convert an attitude from ENU/FLU to NED/FRD, or back: pitch changes its sign, yaw becomes pi/2 - yaw."""
+    """Convert an attitude from ENU/FLU to NED/FRD, or back."""
     w, x, y, z = q
     return (_HALF_SQRT2 * (w + z), _HALF_SQRT2 * (x + y), _HALF_SQRT2 * (x - y), _HALF_SQRT2 * (w - z))

@@ -1,4 +1,4 @@
-"""Places in mission items, commands, setpoints and messages, read in one way.
+"""Places in mission items, commands, setpoints and messages.
 
 Latitude and longitude are given together or left out together; 0, 0 is invalid. An altitude is above sea level in
 MAV_FRAME_GLOBAL (and _INT), above home in every other frame: without a terrain map the ground is flat.
@@ -22,7 +22,7 @@ _COORDINATES = (("latitude", MAX_LATITUDE_DEG), ("longitude", MAX_LONGITUDE_DEG)
 
 
 def misplaced(latitude_deg: float, longitude_deg: float) -> str:
-    """Return the invalid coordinate, with its value and the valid range; empty without one."""
+    """Return the invalid coordinate, with value and valid range, or ""."""
     for (name, maximum), value in zip(_COORDINATES, (latitude_deg, longitude_deg), strict=True):
         if not abs(value) <= maximum:
             return f"{name} {value:.7g} is not within {maximum:g} degrees"
@@ -34,7 +34,7 @@ def misplaced_height(altitude_m: float) -> str:
 
 
 def too_far(place: Vector) -> str:
-    """Return the distance of a place beyond the limit, and the limit; empty within it."""
+    """Return the distance of a place beyond the limit, and the limit, or ""."""
     east, north, up = place
     away_m = hypot(east, north)
     if not away_m <= MAX_DISTANCE_M:
@@ -43,7 +43,7 @@ def too_far(place: Vector) -> str:
 
 
 def far(place: Vector, other: Vector) -> str:
-    """Return how far one place is from another, if that may be a mistake; else an empty text."""
+    """Return how far one place is from another, if that may be a mistake, or ""."""
     away_m = hypot(place[0] - other[0], place[1] - other[1])
     return f"{away_m / 1000.0:.0f} km away" if away_m > FAR_M else ""
 

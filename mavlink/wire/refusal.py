@@ -6,7 +6,7 @@ from colibri.mavlink.wire.dialect import RESULT_DENIED
 
 
 class Refusal(NamedTuple):
-    """Reason of a refusal; `reason` is for ground stations, and empty if the result suffices."""
+    """Reason of a refusal; empty if the result suffices."""
 
     reason: str = ""
     result: int = RESULT_DENIED  # MAV_RESULT

@@ -1,7 +1,7 @@
-"""MAVLink 2 message signing.
+"""MAVLink 2 message signing: https://mavlink.io/en/guide/message_signing.html.
 
-Specification: https://mavlink.io/en/guide/message_signing.html. All components of a network share one key. A signature
-is 13 bytes after the frame: link id, timestamp, and the first 48 bits of the SHA-256 of key and all preceding bytes.
+All components of a network share one key. A signature is 13 bytes after the frame: link id, timestamp, and the first 48
+bits of the SHA-256 of key and all preceding bytes.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ class SigningError(MavlinkError):
 
 
 def parse_key(content: bytes) -> bytes:
-    """Return the key of a key file: 32 bytes, or 64 hexadecimal digits with surrounding white space."""
+    """Return the key of a key file: 32 bytes, or 64 hexadecimal digits."""
     if len(content) == KEY_BYTES:
         key = content
     else:
@@ -51,7 +51,7 @@ def parse_key(content: bytes) -> bytes:
 
 
 def read_key(path: Path) -> tuple[bytes, str]:
-    """Return the key of a file, and a warning if others can read it; a key that others can write is refused."""
+    """Return the key of a file, and a warning if others can read it; one that others can write is refused."""
     content, mode = read_with_mode(path)
     if mode & 0o002:
         raise SigningError(f"writable by everyone (mode {mode:04o}): make a new key, and chmod 600 the file")
@@ -65,11 +65,11 @@ def tick_at(unix_s: float) -> int:
 class Signing:
     """Verifies and signs frames; without a key, accepts all and signs none.
 
-    The own timestamp follows the clock, each signed frame and each later accepted one; it never decreases.
+    The own timestamp follows the clock and all frames; it never decreases.
     """
 
     def __init__(self, key: bytes | None, clock: Callable[[], int], stored: int = 0) -> None:
-        """Begin at the later of the wall `clock`'s time and the `stored` one, in ticks."""
+        """Begin at the later of `clock` and `stored`, in ticks."""
         self._key = _NO_KEY if key is None else key
         self._clock = clock
         self._streams: dict[tuple[int, int, int], int] = {}
@@ -125,11 +125,11 @@ class Signing:
         return True
 
     def _oldest_of_a_new_stream(self, now: int) -> int:
-        """Return the oldest timestamp of an unknown stream; a stored one from the future is not waited for."""
+        """Return the oldest timestamp of a new stream; one stored from the future is not waited for."""
         return max(min(self.timestamp, now + AHEAD_TICKS) - NEW_STREAM_TICKS, self._forgotten + 1)
 
     def _remember(self, stream: tuple[int, int, int], timestamp: int) -> None:
-        """Store a stream's last timestamp; of too many, forget the oldest and reject new ones as old as it."""
+        """Store a stream's last timestamp; of too many, forget the oldest and reject as old ones."""
         self._streams[stream] = timestamp
         if len(self._streams) > STREAMS:
             oldest = min(self._streams, key=self._streams.__getitem__)

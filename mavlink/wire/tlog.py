@@ -1,4 +1,4 @@
-"""Telemetry logs of ground stations: each frame preceded by its time, µs, a big-endian integer."""
+"""Telemetry logs of ground stations: frames, each after its time, µs, a big-endian integer."""
 
 import struct
 from collections.abc import Iterator
@@ -22,11 +22,11 @@ class Logged(NamedTuple):
 
 
 class TlogError(MavlinkError):
-    """The file is not a telemetry log; the message has the first invalid byte."""
+    """The file is not a telemetry log."""
 
 
 def decode(log: bytes) -> Iterator[Logged]:
-    """Yield the frames of a log, the last of which may be truncated; raise `TlogError` on a malformed one."""
+    """Yield the frames of a log, the last may be truncated; raise `TlogError` on a malformed one."""
     at = 0
     while at + STAMP.size < len(log):
         begin = at + STAMP.size
@@ -40,7 +40,7 @@ def decode(log: bytes) -> Iterator[Logged]:
 
 
 class TlogWriter(BlockLog):
-    """A telemetry log written in blocks; a `shared` one goes on, and has several writers."""
+    """A telemetry log written in blocks; a `shared` one has several writers."""
 
     def __init__(self, path: Path, *, shared: bool = False) -> None:
         super().__init__(path, "ab" if shared else "wb")
