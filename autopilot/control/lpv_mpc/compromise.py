@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.matrices import inverse, matmul, norm, put
 from colibri.common.types import Array
@@ -28,7 +29,7 @@ _POWERS = np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0
 _FIXED = 5  # what a plan starts from: position, velocity, three coefficients
 _VELOCITY, _BEND = 0.04, 5e-4  # weights; that of the position is 1 for each second
 _LAST, _LAST_VELOCITY = 5.0, 0.5  # of the last knot, added, in parts of a piece
-_PENALTY, _ITERATIONS = 1e-4, 20  # of ADMM
+_PENALTY, _ITERATIONS, _BEGINNINGS = 1e-4, 20, 10  # of ADMM; of iterations for a plan that begins anew
 _SPARED, _SPARED_AT_MOST = 0.5, 0.1  # part of the thrust left for moments: of the references' excess, and at most
 _ASTRAY_M = 0.3  # a vehicle farther from its plan is where the next one begins
 _SMALL = (1e-3, 1e-2, 0.05)  # m, m/s, m/s²: a smaller deviation ends
@@ -112,13 +113,12 @@ def stay_within(
         excess, most = _needed(now, velocity, acceleration, law.interval_s, vehicle, needed)
         gravity_m_s2 = vehicle[0].airframe.gravity_m_s2
         if astray:
-            coefficients[:, :], dual[:, :], phase = 0.0, 0.0, 0
+            coefficients[:, :], phase = 0.0, 0
             for i in range(3):
                 motion[0, i], motion[1, i] = rigid[i] - position[0, i], rigid[3 + i] - velocity[0, i]
-            for _ in range(3):  # it begins with the acceleration it goes on with
+            _begin(now, needed[0], vehicle, d, coefficients)
+            for _ in range(_BEGINNINGS):
                 _plan(motion, coefficients, dual, needed, most, gravity_m_s2, law)
-                for k in range(3):
-                    put(coefficients[3], coefficients[k])
         ends = excess <= 0.0 and norm(motion[0]) < _SMALL[0] and norm(motion[1]) < _SMALL[1]
         for k in range(PIECES + 3):
             ends = ends and norm(coefficients[k]) < _SMALL[2]
@@ -169,6 +169,19 @@ def _needed(
         worst = max(worst, norm(needed[k]))
     excess = worst / most - 1.0
     return excess, most * (1.0 - min(_SPARED * max(excess, 0.0), _SPARED_AT_MOST))
+
+
+@compiled
+def _begin(now: Packed, needed: Array, vehicle: Packed, d: float, coefficients: Array) -> None:
+    """Write the first coefficients of a plan from the vehicle's thrust and its turn."""
+    rigid, model = now[0].rigid, vehicle[0]
+    R, flown = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9])), 0.0
+    for j in range(model.allocation.shape[1]):
+        flown += model.allocation[0, j] * now[0].squared[j] / model.airframe.mass_kg
+    for i in range(3):
+        turn = d * flown * (R[i][0] * rigid[11] - R[i][1] * rigid[10])
+        for k in range(3):
+            coefficients[k, i] = flown * R[i][2] - needed[i] + (k - 1) * turn
 
 
 @compiled
