@@ -201,8 +201,6 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 class _Collector:
-    """Adds up the reports of all workers."""
-
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
 
@@ -231,7 +229,7 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
 
 
 def _say_what_takes_long(config: pytest.Config) -> None:
-    """Say once that machine code is compiled, past the capture of output; of several workers the first says it."""
+    """Say once that machine code is compiled; of several workers the first says it."""
     worker: str = getattr(config, "workerinput", {}).get("workerid", "gw0")
     if worker != "gw0" or config.stash.get(_SAYS_COMPILING, False):
         return
@@ -256,10 +254,7 @@ def _in_one_line() -> Iterator[None]:
 
 
 def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
-    """Return the launcher of this run or worker, if flights use processes.
-
-    While `stack` is open, a worker's processes share one core if there is a worker for each core.
-    """
+    """Return the launcher of this worker; its processes share one core if there is a worker for each core."""
     if config.getoption("--sitl-link") == "memory":
         return None
     from colibri.sitl.backends.launcher import Launcher, one_core

@@ -24,7 +24,7 @@ _INTERVAL_S = 0.02
 
 
 class Row(NamedTuple):
-    """A row of the table: a track, by its name and top speed (0: its only one), under a disturbance."""
+    """A track at a top speed (0: its only one), under a disturbance."""
 
     track: str
     speed_m_s: float
@@ -81,10 +81,8 @@ class ArenaSet(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Arena:
-    """A set, and the folder of its file."""
-
     def __init__(self, given: str) -> None:
-        """`given` is the name of a set, or a path that ends in `.toml`; CampaignError if it cannot be read."""
+        """`given`: the name of a set, or a path that ends in `.toml`; CampaignError if it cannot be read."""
         self.set = read_named("set", _FOLDER, given, ArenaSet, CampaignError)
         self._folder = Path(given).parent if given.endswith(".toml") else _FOLDER
         self._vehicles: dict[str, Vehicle] = {}

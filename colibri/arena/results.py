@@ -1,4 +1,4 @@
-"""Table and figure of an arena: the worst of all starts, and published values beside."""
+"""Table and figure of an arena, with published values."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +55,7 @@ class Cell(NamedTuple):
 
 
 class ArenaResults(CampaignResults):
-    """The results of an arena; its campaign has the name or path of the set, and factors `law` and `case`."""
+    """The results of an arena, named after its set; the factors are `law` and `case`."""
 
     @cached_property
     def arena(self) -> Arena:
@@ -63,7 +63,6 @@ class ArenaResults(CampaignResults):
 
     @cached_property
     def cells(self) -> dict[tuple[str, Row], Cell]:
-        """The cells by law and row, in the order of the set."""
         values = np.column_stack([self.metric(metric.name) for metric in METRICS])
         found: dict[tuple[str, str], list[int]] = {}
         for (law, case), places in self.groups().items():
@@ -80,14 +79,14 @@ class ArenaResults(CampaignResults):
         return Cell(len(places), int(away.sum()), *(round(float(value), 3) for value in worst))
 
     def rows_by_law(self) -> list[dict[str, Any]]:
-        """Return a row for each law, track, speed and disturbance, as plain data; thrust in parts of the rotors'."""
+        """Return plain data of each law and row; thrust in parts of what the rotors have."""
         return [
             {"law": law, **row._asdict(), "thrust": self._thrust[row], **cell._asdict()}
             for (law, row), cell in self.cells.items()
         ]
 
     def table(self) -> tuple[Cells, list[Cells]]:
-        """Return mean errors, mm: a row for each track, speed and disturbance, a column for each law."""
+        """Return mean errors, mm, a column for each law."""
         published = {
             (each.law, row): value for each in self.arena.set.published for row, value in self._published(each)
         }
@@ -107,7 +106,7 @@ class ArenaResults(CampaignResults):
         return f"{cell} in {cell.track_s:.2f} s"
 
     def law_table(self) -> tuple[Cells, list[Cells]]:
-        """Return for each law its rate and preview, lost flights, and figures over all rows."""
+        """Return rate, preview, lost flights and errors of each law."""
         lines: list[Cells] = []
         for level in self.campaign.grid["law"]:
             law = build_law(level.settings, self.arena.vehicle())
@@ -132,7 +131,6 @@ class ArenaResults(CampaignResults):
                 yield Row(track, speed, each.world), value
 
     def save(self, folder: str | Path, *, parquet: bool = False) -> Path:
-        """Write `arena.md`, `arena.csv`, `arena.json`, `arena.png` and `flights.csv`; return the folder."""
         del parquet
         path = Path(folder)
         (path / "flights.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
@@ -150,7 +148,7 @@ class ArenaResults(CampaignResults):
         return path
 
     def plot(self, metric: str | None = None) -> Figure:
-        """Return mean errors over speed, or over disturbances where tracks have one speed, a panel for each track."""
+        """Return mean errors over speed, or over disturbances where tracks have one speed."""
         del metric
         by_speed = any(len(speeds) > 1 for speeds in self.arena.set.speeds.values())
         tracks = list(self.arena.set.tracks)

@@ -25,7 +25,7 @@ DEFAULT_LAWS = ("agile", "flight", "se3")
 
 
 def arena(args: Namespace) -> int:
-    """Fly each set in a folder of its name, print its tables, and return the exit code."""
+    """Fly each set in a folder of its name, and print its tables."""
     laws, sets, code = laws_of(args.law or DEFAULT_LAWS), list(dict.fromkeys(args.sets)), 0
     if len(sets) > 1 and (args.json or args.junit):
         raise CampaignError(f'{"--json" if args.json else "--junit"}: takes one set, not "{" ".join(sets)}"')
@@ -44,7 +44,6 @@ def arena(args: Namespace) -> int:
 
 
 def planned_of(name: str, laws: dict[str, dict[str, Any]], starts: int) -> Campaign:
-    """Return the campaign of a set; its cases are the rows, from each start."""
     if not 1 <= starts <= MAX_STARTS:
         raise CampaignError(f'starts: must be 1 to {MAX_STARTS}, not "{starts}"')
     flown = Arena(name)

@@ -27,7 +27,6 @@ class FlightBar:
         self._flown = self._lost = 0
 
     def begun(self, kept: int) -> None:
-        """Start with `kept` flights done."""
         self._bar.start()
         self._bar.start_task(self._task)
         self._bar.update(self._task, completed=kept)

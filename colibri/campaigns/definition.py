@@ -80,7 +80,6 @@ class Point(NamedTuple):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Options and keys with their values, levels expanded."""
         found: dict[str, Any] = {}
         for name, value in self.factors.items():
             found |= value.settings if isinstance(value, Level) else {name: value}
@@ -127,7 +126,7 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Yield flights that test each value of each factor, of numbers the ends, by the last seed."""
+        """Yield flights that test all values of each factor, of numbers the ends."""
         first = next(self.points())._replace(seed=self.seeds[-1])
         yield first
         for factor, values in self.grid.items():

@@ -35,8 +35,6 @@ _WORDS = {"rmse": "RMSE", "qp": "QP", "nees": "NEES", "max": "maximum", "p50": "
 
 
 class _Group(NamedTuple):
-    """The flights of one combination, with its coordinates along the axes."""
-
     name: str
     at: tuple[float, ...]
     places: list[int]
@@ -100,7 +98,6 @@ def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
 
 
 def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
-    """Draw median and 5 to 95 % range over a factor, and the share of lost flights."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
     for name, color in zip(names, COLORS, strict=False):

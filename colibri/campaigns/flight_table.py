@@ -26,11 +26,10 @@ class FlightTable:
 
     @property
     def headings(self) -> Row:
-        """Column names of `rows`."""
         return self.campaign.columns
 
     def rows(self) -> list[Row]:
-        """Return one row of texts per flight; numbers with ten digits."""
+        """Return a row of texts per flight; numbers have ten digits."""
         return [self._row(each) for each in self.flown]
 
     @cached_property
@@ -120,7 +119,6 @@ class FlightTable:
         return headings, rows
 
     def through(self, places: Sequence[int]) -> list[int]:
-        """Return the flights with verdict `flown`."""
         return [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
 
     def lost(self, places: Sequence[int]) -> tuple[int, int, int]:

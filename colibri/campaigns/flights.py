@@ -55,7 +55,7 @@ class MetricError(CampaignError, ForeignError):
 
 
 class Common(NamedTuple):
-    """Data common to all flights, with the contents of files, which a worker may not have."""
+    """What all flights share, with the contents of files, which a worker may not have."""
 
     fly: dict[str, Any]
     metrics: tuple[Metric, ...]
@@ -106,7 +106,7 @@ def common_of(campaign: Campaign, *, remote: bool = False) -> Common:
 
 
 def _travelling(campaign: Campaign) -> dict[str, tuple[str, Any]]:
-    """Return the laws of files by their places; pickle modules by value, if they belong to no installed package."""
+    """Return the laws of files by place; modules outside installed packages are pickled by value."""
     places = filter(is_place, _names(campaign, "controller"))
     laws = {place: (current_name(place), load_controller(place)) for place in places}
     given = (*(metric.of for metric in campaign.metrics), *campaign.values("controller"), *campaign.values("track"))

@@ -1,4 +1,4 @@
-"""What commands of many flights hand to continuous integration: limits, JSON and JUnit XML."""
+"""Limits, JSON and JUnit XML of many flights, for continuous integration."""
 
 import json
 import sys

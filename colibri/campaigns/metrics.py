@@ -27,7 +27,6 @@ class Metric(NamedTuple):
 
 
 def usual(*, sensors: bool) -> tuple[Metric, ...]:
-    """Return the default metrics, which are deterministic."""
     return tuple(map(Metric, (*_ALWAYS, *(_ON_SENSORS if sensors else ()), *_OUTCOMES)))
 
 

@@ -85,7 +85,7 @@ def fly_campaign(
     begun: Callable[[int], object] = lambda _kept: None,
     kind: type[CampaignResults] = CampaignResults,
 ) -> CampaignResults:
-    """Fly the flights missing in `out`, and write the tables, also if interrupted; results are of a `kind`."""
+    """Fly the flights missing in `out`; the tables are written also if interrupted."""
     if planned.flights > MAX_UNASKED and not yes:
         raise CampaignError(f"{planned.flights} flights: confirm with --yes")
     if parquet:

@@ -1,4 +1,4 @@
-"""The checks: Python and packages, machine code, network, a flight, a ground station."""
+"""The checks of `colibri doctor`."""
 
 import os
 import platform
@@ -182,7 +182,7 @@ def ports() -> Iterator[Finding]:
 
 
 def beyond() -> Finding | None:
-    """Return the host's address as seen from a container or WSL, if this is one."""
+    """Return the host's address, from a container or WSL."""
     what = "WSL" if _in_wsl() else "container" if any(path.exists() for path in _CONTAINERS) else None
     if what is None:
         return None
@@ -239,7 +239,6 @@ def ground_station(link: GroundLink, within_s: float) -> Finding:
 
 
 def called(link: GroundLink, within_s: float) -> str | None:
-    """Describe the first ground station that answers."""
     codec = Codec(1, mav.MAV_COMP_ID_AUTOPILOT1)
     beat = (mav.MAV_TYPE_QUADROTOR, mav.MAV_AUTOPILOT_GENERIC, 0, 0, mav.MAV_STATE_STANDBY, 3)
     stations: set[Address] = set()

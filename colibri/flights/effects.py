@@ -40,12 +40,11 @@ class FlownOptions(NamedTuple):
 
     @property
     def has_parts(self) -> bool:
-        """Whether the vehicle has each part that is left out."""
         return self.whole is None or all(self.whole.without([part]) != self.whole for part in self.spec.without)
 
 
 class EffectRule(NamedTuple):
-    """What an option needs: if it is not met, it has no effect for this reason."""
+    """An option has an effect if this is met, and else not for this reason."""
 
     option: str
     reason: str

@@ -31,8 +31,6 @@ _LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "r
 
 
 class StatusLines:
-    """Collects and draws the events of the processes."""
-
     def __init__(self, *, quiet: bool) -> None:
         self._console = Console(stderr=True, highlight=False, soft_wrap=True)
         self._facts: dict[int, dict[str, Any]] = {}

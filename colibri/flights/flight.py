@@ -40,8 +40,6 @@ class Answered(NamedTuple):
 
 
 class Wire(Protocol):
-    """Carries a frame of the plant to the autopilot, and the answer back."""
-
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered: ...
 
 

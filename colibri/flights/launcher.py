@@ -1,10 +1,9 @@
 """Start, watch and end plant and autopilot as child processes.
 
-A child is forked if this process may be: loading takes longer than most flights. Otherwise it is started as a command,
-and reads its specification as JSON from standard input.
+A child is forked if this process may be, as loading takes longer than most flights. Otherwise it is a command that
+reads its specification as JSON from standard input. Each has its own process group: Ctrl-C reaches only this process,
+which ends its children by SIGTERM, then by SIGKILL. A child also ends if this process dies.
 
-Each has its own process group, so that Ctrl-C reaches only this process, which ends its children in order: SIGTERM,
-then SIGKILL after the grace period. Each also ends if this process dies.
 """
 
 import json
@@ -42,12 +41,12 @@ def name_of(spec: ProcessSpec) -> str:
 
 
 def can_fork() -> bool:
-    """Whether this process may be forked: on Linux with one thread, as locks of others would stay held."""
+    """Whether this process may be forked: locks of other threads would stay held."""
     return _TASKS.is_dir() and len(list(_TASKS.iterdir())) == 1 and not current_process().daemon
 
 
 class Child:
-    """A plant or an autopilot as a child of this process, which ends with it."""
+    """A plant or an autopilot as a child of this process."""
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
         self.name = name_of(spec)
@@ -150,7 +149,7 @@ def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:
 
 
 def _use_safe_path() -> None:
-    """Remove the path that -P leaves out; a script may have put others before it."""
+    """Remove the path that -P leaves out."""
     if not sys.flags.safe_path:
         unsafe = ("", os.getcwd(), os.path.dirname(os.path.abspath(sys.argv[0])))
         place = next((place for place, folder in enumerate(sys.path) if folder in unsafe), None)

@@ -54,10 +54,10 @@ class Contents(NamedTuple):
     """The contents of the files named in a specification.
 
     Attributes:
-        profile: With the law, solver and delay of the options.
         plant_vehicle: Without the parts left out.
         track_file: Text of the track's file, if it has one.
         whole: The plant's vehicle with the parts left out; `None` in a recorded flight.
+
     """
 
     profile: Profile
@@ -72,11 +72,9 @@ class FlightPlan:
     """A flight that can begin.
 
     Attributes:
-        spec: The flight as described.
-        contents: Contents of the files it names.
-        start: Initial state of the plant.
         track: Track to fly, adapted to the vehicle's limits.
         track_note: Changes of the track, or the limit that it exceeds; else empty.
+
     """
 
     spec: FlightSpec
@@ -213,7 +211,7 @@ def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
 
 
 def _check_order(vehicle: Vehicle, plant_vehicle: Vehicle) -> None:
-    """Refuse a plant whose rotors are the same in another order: each command would reach the wrong one."""
+    """Refuse a plant with the same rotors in another order."""
     ours, plants = (
         [(round(degrees(atan2(-y, x)) / _ALIKE_DEG) % _SECTORS, z) for x, y, z in each.rotors.points_m().tolist()]
         for each in (vehicle, plant_vehicle)
@@ -229,7 +227,7 @@ def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:
 
 
 def _usual_start(profile: Profile, vehicle: Vehicle, flown: Track, feedback: Feedback) -> Start:
-    """Return the default start: at rest with the first yaw, on the track; with sensors on the ground."""
+    """Return a start at rest with the first yaw, on the track; with sensors on the ground."""
     x, y, z = profile.simulation.position_enu_m or position(flown, np.zeros(1))[0].tolist()
     yaw_deg = degrees(start_yaw(flown, profile.references))
     if feedback is Feedback.SENSORS:

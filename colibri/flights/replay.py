@@ -52,8 +52,6 @@ class Answer(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """The first command that differs."""
-
     recorded: ActuatorCommand
     replayed: ActuatorCommand
     mode: str

@@ -1,10 +1,9 @@
 """Snapshots of running objects: their state is copied, and written back into the same objects.
 
-A snapshot follows every reference from its roots: attributes, containers, arrays, closures, bound methods. It keeps a
-shallow copy of each mutable object, the numbers of arrays, and the state of random generators. Immutable objects are
-shared. Restoring writes into the same objects, so that references to them, as in a callback, stay valid.
+A snapshot follows every reference from its roots, and keeps a shallow copy of each mutable object. Immutable objects
+are shared; files, sockets and the state of modules and classes are left out. As objects stay the same, references to
+them stay valid, as in a callback.
 
-Files, sockets and the state of modules and classes are left out; a state that cannot be read is a SnapshotError.
 """
 
 from collections import deque
@@ -34,8 +33,6 @@ Keep: TypeAlias = Callable[[Any], Kept]
 
 
 class ObjectSnapshot:
-    """The state of some objects and of all their references."""
-
     def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:
         restores: list[Restore] = []
         seen = {id(each): each for each in shared}

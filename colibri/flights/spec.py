@@ -28,8 +28,6 @@ class OptionError(Error):
 
 
 class Window(NamedTuple):
-    """A part of a flight, s."""
-
     begin_s: float
     end_s: float
 
@@ -71,7 +69,7 @@ def merged(given: Iterable[Any]) -> dict[str, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class VehiclesSpec(WorldSpec, LawSpec):
-    """The law and its vehicle, and vehicle and world of the plant."""
+    """The law and its vehicle, the plant and its world."""
 
     plant_vehicle: Annotated[
         str | Vehicle | None,

@@ -174,7 +174,6 @@ class Episodes:
         self.flying = np.zeros(count, dtype=np.bool_)
 
     def begin(self, n: int, chance: Generator) -> None:
-        """Begin an episode of row `n`, drawn from `chance`."""
         values = {key: each.value(chance) for key, each in self._draws.items()}
         self._chances[n] = chance
         self._begin(n, self._drawn({**self._fixed, **values}))
@@ -197,7 +196,6 @@ class Episodes:
         return self._passed if self.gate_m else self.steps
 
     def _seen(self, n: int) -> Array:
-        """Return the state that a row observes."""
         seen: Array = self.x[n]
         return seen
 
@@ -257,7 +255,6 @@ class Episodes:
         )
 
     def info(self) -> dict[str, Any]:
-        """Return what is known of the first row beside its observation."""
         return {"why": ENDS[self._ends[0]]} if self._ends[0] else {}
 
     def why(self, n: int) -> str:
@@ -265,12 +262,11 @@ class Episodes:
         return ENDS[self._ends[n]]
 
     def snapshot(self) -> EpisodesSnapshot:
-        """Keep states, vehicles and random numbers of all rows."""
         chances = tuple(None if it is None else it.bit_generator.state for it in self._chances)
         return EpisodesSnapshot(tuple(array.copy() for array in self._memory()), chances)
 
     def restore(self, snapshot: EpisodesSnapshot, chances: Sequence[Generator]) -> None:
-        """Continue from a snapshot of an environment of the same shape, with `chances` set to its random numbers."""
+        """Continue from a snapshot of the same keywords, with `chances` set to its random numbers."""
         memory = self._memory()
         kept = snapshot.arrays if isinstance(snapshot, EpisodesSnapshot) else ()
         if [(it.shape, it.dtype) for it in kept] != [(it.shape, it.dtype) for it in memory]:
@@ -326,7 +322,7 @@ class Episodes:
         return Begun(vehicle, wind, lost, x, action, parameters, mixer, scale)
 
     def _built(self, changes: list[tuple[str, Any]]) -> tuple[Any, ...]:
-        """Return the vehicle with changes, and what follows from it; the last one is kept."""
+        """Return the vehicle with changes, and what follows from it."""
         if self._last_built is None or self._last_built[0] != changes:
             vehicle = self.vehicle
             for key, value in changes:

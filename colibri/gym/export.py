@@ -1,4 +1,4 @@
-"""Policies as files that fly as control laws: an ONNX model, and a TOML file of its inputs and outputs."""
+"""Policies as control laws: an ONNX model, and a TOML file of its inputs and outputs."""
 
 from collections.abc import Sequence
 from pathlib import Path

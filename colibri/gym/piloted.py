@@ -91,7 +91,6 @@ class PilotedEpisodes(Episodes):
         return super().snapshot()._replace(flight=kept)
 
     def restore(self, snapshot: EpisodesSnapshot, chances: Sequence[Generator]) -> None:
-        """Continue from a snapshot; it must be one of this environment."""
         if not isinstance(snapshot, EpisodesSnapshot) or snapshot.flight is None or snapshot.flight[0] is not self:
             raise GymError("snapshot must come from snapshot() of this environment: its flight is restored in place")
         super().restore(snapshot, chances)
@@ -128,7 +127,7 @@ class PilotedEpisodes(Episodes):
         return structs.replace(alone.replace(key, 0.001 * ms), simulation=simulation)
 
     def _settle(self) -> None:
-        """Fly to the start of the reference, in mode offboard, until estimator and control law have settled."""
+        """Fly to the start of the reference in mode offboard, until all has settled."""
         flight, pilot = self._flight, self._flight.autopilot.stages.pilot
         flight.step()
         until_us = round(_READY_WITHIN_S * 1e6)
@@ -157,7 +156,6 @@ class PilotedEpisodes(Episodes):
         self._flight.autopilot.stages.stations.offboard.keep(_COMPANION, setpoint._replace(time_us=now_us), now_us)
 
     def _look(self) -> None:
-        """Take in the true state."""
         world, x = self._flight.plant.world, self.x[0]
         x[:13], x[13:-1], x[-1] = world.state, world.rotor_speeds, world.charge_used_ah
 

@@ -38,7 +38,6 @@ class Picture:
         self._star = np.vstack([part for end in ends for part in (np.zeros(3), end, np.full(3, np.nan))])
 
     def begin(self) -> None:
-        """Begin an episode."""
         points = self._episodes.reference[:, :3]
         self._reference.set_data_3d(*points.T)
         shown = np.vstack([points, self._episodes.x[0, 6:9]])
@@ -50,7 +49,6 @@ class Picture:
         self.step()
 
     def step(self) -> None:
-        """Take in the present position."""
         self._trail.append(self._episodes.x[0, 6:9].copy())
         del self._trail[:-_TRAIL]
 

@@ -1,4 +1,4 @@
-"""The record of a flight: its frames, datagrams, and STATUSTEXT messages before the link loses any."""
+"""The record of a flight, with all STATUSTEXT messages sent."""
 
 import csv
 from hashlib import sha256
@@ -19,8 +19,6 @@ _STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
 
 
 class StatusTexts(Inbox):
-    """The texts of a vehicle with the times of sending."""
-
     def __init__(self) -> None:
         super().__init__()
         self._codec = Codec(0, 0)
@@ -87,7 +85,6 @@ class Record:
         return dict(zip(self._names, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
     def keep(self, folder: Path) -> None:
-        """Write the table and both logs into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / TABLE).open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")

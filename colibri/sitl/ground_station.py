@@ -91,13 +91,11 @@ class Station(Inbox):
     # What a flight does with it.
 
     def departing(self, now_us: int) -> list[bytes]:
-        """Return the datagrams that reach the vehicle now."""
         for datagram in self._client.poll(now_us):
             self.send_raw(datagram)
         return self._up.due(now_us)
 
     def arriving(self, datagram: bytes, now_us: int) -> None:
-        """Put a datagram of the vehicle on the link."""
         self._down.put(datagram, now_us)
 
     def listen(self, now_us: int) -> None:

@@ -55,7 +55,7 @@ def setting_values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
 
 
 def arguments(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
-    """Return the arguments of a mark by name; fail in one line, which begins with `of`."""
+    """Return the arguments of a mark by name; a failure begins with `of`."""
     known = MARKS[mark.name]
     names = list(known.options)
     typo = next((name for name in mark.kwargs if name not in names), None) if names else None
@@ -72,7 +72,7 @@ def written(mark: pytest.Mark) -> str:
 
 
 def without_effect(item: pytest.Item, fixtures: Iterable[str], registered: list[str]) -> str | None:
-    """Return what is wrong with the marks of a test: one without its fixture, or a typo; None if nothing is."""
+    """Return what is wrong with a test's marks: one without its fixture, or a typo."""
     used = set(fixtures)
     if used & {"sitl", "sitl_fleet"}:
         return next(filter(None, (_typo(mark, registered) for mark in item.iter_markers())), None)
@@ -84,7 +84,7 @@ def without_effect(item: pytest.Item, fixtures: Iterable[str], registered: list[
 
 
 def _typo(mark: pytest.Mark, registered: list[str]) -> str | None:
-    """Return what an unregistered mark with arguments was meant to be, if it looks like one of ours."""
+    """Return what an unregistered mark with arguments was meant to be."""
     if mark.name in registered or not (mark.args or mark.kwargs):
         return None
     from colibri.common.spec import fields_of

@@ -85,7 +85,6 @@ class Flights:
         return places
 
     def summary(self) -> dict[str, Any]:
-        """Return number, simulated time in s, and hashes."""
         return {
             "flights": len(self.flown),
             "simulated_s": sum(sitl.time_s for sitl in self.flown),

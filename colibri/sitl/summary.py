@@ -1,4 +1,4 @@
-"""The summary of a test run's flights, and what a failed test's flights add to JUnit XML: a text and pictures."""
+"""The summary of a run's flights, and their text and pictures in JUnit XML."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,8 +15,6 @@ FLOWN = "sitl_flown"
 
 
 class Summary:
-    """Adds up the reports of all processes in any order."""
-
     def __init__(self, began_s: float) -> None:
         self._began_s = began_s
         self.flights = 0

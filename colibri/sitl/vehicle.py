@@ -78,10 +78,11 @@ class Sitl(View, Stepped, Steered):
     Attributes:
         items: Functions for items of missions and fences, such as `items.waypoint(3.0, 0.0, 5.0)`.
         Refused: The error if the vehicle refuses.
-        NotInTime: The error if a condition is not met in time, an AssertionError.
-        gcs: The first ground station, which sends the commands of `Sitl`.
+        NotInTime: The AssertionError if a condition is not met in time.
+        gcs: The first ground station, which sends commands.
         link: Link faults, which may be changed at any time.
         fleet: The vehicles in the same simulated time; empty if it flies alone.
+
     """
 
     items = items
@@ -113,7 +114,6 @@ class Sitl(View, Stepped, Steered):
             super().__setattr__(name, value)
 
     def begin(self) -> None:
-        """Fly until the first HEARTBEAT, if the setting requires it."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 
@@ -125,13 +125,11 @@ class Sitl(View, Stepped, Steered):
         self.have_others_catch_up()
 
     def have_others_catch_up(self) -> None:
-        """Fly the vehicles of the fleet that are behind this one."""
         for other in self.fleet:
             while other.time_us < self.time_us:
                 other.fly_frame()
 
     def fly_frame(self) -> None:
-        """Fly one frame of this vehicle alone."""
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
@@ -296,7 +294,6 @@ class Sitl(View, Stepped, Steered):
     # Messages that are not answered.
 
     def send(self, name: str, *fields: Any) -> None:
-        """Send a message from the first ground station."""
         self.gcs.send(name, *fields)
 
     # What goes wrong.

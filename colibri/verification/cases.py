@@ -33,7 +33,7 @@ class TrackCase(NamedTuple):
         return FlightPlan.of(FlightSpec.of(**(options | {"out": out} | more)))
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
-        """Fly with the logs in `out`; return the hash of the trajectory."""
+        """Return the hash of the trajectory; logs are in `out`."""
         prepare(out)
         if self.waypoints:
             _write(out / _WAYPOINTS_FILE, self.waypoints)
@@ -52,7 +52,7 @@ class SitlCase:
     setting: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(self, out: Path, link: str) -> str:
-        """Fly with the logs in `out`; return the hash of all truth and commands."""
+        """Return the hash of all truth and commands; logs are in `out`."""
         from colibri.sitl.backends.launcher import Launcher
         from colibri.sitl.session import Flights
 

@@ -1,7 +1,8 @@
-"""The golden flights: a fixed set, sensitive to a single bit.
+"""The golden flights, sensitive to a single bit.
 
-Flights that saturate, tumble or use noisy sensors amplify one bit within a second; good tracking hides it, as the link
-carries 32-bit floats. Both are included: the former find a difference, the latter show where it matters.
+Flights that saturate, tumble or use noisy sensors amplify one bit within a second, and find a difference. Others show
+where it matters.
+
 """
 
 from typing import TYPE_CHECKING, Any

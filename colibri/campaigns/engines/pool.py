@@ -1,4 +1,4 @@
-"""Run jobs in a pool of processes, with a progress bar; the interface of engines."""
+"""The interface of engines, and a pool of processes."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 class Killed:
-    """Replaces the result of a job that killed its worker twice, the second time on its own."""
+    """The result of a job that killed its worker twice, the second time alone."""
 
 
 class Engine(Protocol):

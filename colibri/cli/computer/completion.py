@@ -21,7 +21,7 @@ def run(args: Namespace) -> int:
 
 
 def completed_parser() -> ArgumentParser:
-    """Return a parser with the possible values of each argument, for completion only."""
+    """Return a parser with all possible values of arguments."""
     from colibri.autopilot.__main__ import command_line as autopilot
     from colibri.cli.shared.commands import COMMANDS
     from colibri.cli.shared.parser import parser_of

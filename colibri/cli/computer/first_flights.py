@@ -24,7 +24,7 @@ _SHARED_BY = 2
 
 
 def compile_all(names: Sequence[str], *, quiet: bool) -> int:
-    """Fly them, or all, on two cores; one line at the end, and the number of functions meanwhile."""
+    """Fly those named, or all, on two cores."""
     began_s = perf_counter()
     for name in names:
         if name not in FLIGHTS:

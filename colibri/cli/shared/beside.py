@@ -30,7 +30,6 @@ def say(line: str) -> None:
 
 @contextmanager
 def viewed(args: Namespace, links: list[str]) -> Iterator[None]:
-    """Show the flight over an additional link if `--view` is given."""
     if not args.view:
         yield
         return

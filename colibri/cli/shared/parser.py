@@ -21,7 +21,7 @@ class Subcommand(Protocol):
 
 
 class Version(Action):
-    """Print the version and exit; it is looked up only now, as that takes time."""
+    """Print the version, which takes time to find, and exit."""
 
     def __call__(self, *_: object) -> NoReturn:
         from importlib.metadata import version
@@ -38,7 +38,6 @@ class _Grouped(RawDescriptionHelpFormatter):
 
 
 def parser_for(given: Sequence[str]) -> ArgumentParser:
-    """Return the parser with the options of the given subcommand only."""
     asked = next((word for word in given if word in COMMANDS), None)
     return parser_of(*(name for name in COMMANDS if name == asked))
 

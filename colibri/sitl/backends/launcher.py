@@ -19,8 +19,8 @@ _LAST_WORDS_BYTES = 2000
 class Launcher:
     """Starts processes `from_scratch` as a user does, or forks each autopilot from a loaded server.
 
-    Loading takes longer than most flights. A server starts no plants, which run in the test's process: on a shared
-    core, two processes make better use of the caches than three.
+    Plants then run in the test's process: on a shared core two processes make better use of the caches than three.
+
     """
 
     def __init__(self, *, from_scratch: bool = False) -> None:
@@ -50,8 +50,6 @@ class Launcher:
 
 
 class LoggedChild:
-    """A process of a flight; its output goes to `log`."""
-
     def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
         self.name, self.log = name_of(spec), log
         self._launcher = launcher

@@ -1,7 +1,4 @@
-"""A flight in lockstep: pass datagrams between plant and autopilot, frame by frame.
-
-Each side may be in this process or another; the bytes are the same. Flights are independent of the link's clock.
-"""
+"""A flight in lockstep: datagrams pass between plant and autopilot, of this process or others, frame by frame."""
 
 from collections.abc import Sequence
 from time import perf_counter, sleep

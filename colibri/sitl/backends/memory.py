@@ -30,7 +30,7 @@ _ADDRESS: Address = ("memory", 0)
 
 
 class MemoryPlant:
-    """A plant in this process; with a `clock` if the autopilot is in another."""
+    """A plant in this process; `clock` if the autopilot is in another."""
 
     process = None
 
@@ -146,8 +146,6 @@ class MemoryAutopilot:
 
 
 class _MemoryConductor:
-    """Passes messages of ground stations within this process."""
-
     from_stations: StepMessage | None = None
     to_stations: StepMessage | None = None
 

@@ -25,8 +25,6 @@ _HERE = "udpin:127.0.0.1:0"
 
 
 class UdpPlant:
-    """A plant in another process."""
-
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
         self._link: UdpLink | None = None
@@ -83,8 +81,6 @@ class UdpPlant:
 
 
 class UdpAutopilot:
-    """An autopilot in another process."""
-
     def __init__(self, launcher: Launcher, spec: AutopilotSpec, folder: Path) -> None:
         self._launcher = launcher
         self._folder = folder
