@@ -8,13 +8,13 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("log", type=Path, metavar="DIR|FILE.ulg", help="a flight by its folder, or any ULog, PX4's too")
-    add("--mcap", action="store_true", help="write flight.mcap beside it, for Foxglove")
-    add("--csv", action="store_true", help="write flight-topics/*.csv beside it, a table of each topic")
-    add("--mat", action="store_true", help="write flight.mat beside it, a struct of each topic, for MATLAB and Octave")
-    add("--parquet", action="store_true", help="write flight-topics/*.parquet beside it, a table of each topic")
-    add("--quiet", action="store_true", help="print errors only")
+    add = parser.value
+    add("log", "DIR|FILE.ulg", "a flight by its folder, or any ULog, PX4's too", type=Path)
+    parser.flag("--mcap", "write flight.mcap beside it, for Foxglove")
+    parser.flag("--csv", "write flight-topics/*.csv beside it, a table of each topic")
+    parser.flag("--mat", "write flight.mat beside it, a struct of each topic, for MATLAB and Octave")
+    parser.flag("--parquet", "write flight-topics/*.parquet beside it, a table of each topic")
+    parser.flag("--quiet", "print errors only")
 
 
 def run(args: Namespace) -> int:

@@ -14,11 +14,10 @@ from colibri.flights.spec import FlightSpec
 def add_options(parser: ArgumentParser) -> None:
     start = "the profile's, and the track's first yaw"
     add_spec(parser, FlightSpec, defaults={"link": "udp"}, shown={"start": start})
-    add = parser.add_argument
-    add_view(add)
-    add("--quiet", action="store_true", help="print errors only")
-    add_gate(add, NONE_LOST)
-    add("--no-figures", action="store_true", help="draw no PNG figures")
+    add_view(parser)
+    parser.flag("--quiet", "print errors only")
+    add_gate(parser, NONE_LOST)
+    parser.flag("--no-figures", "draw no PNG figures")
 
 
 def run(args: Namespace) -> int:

@@ -8,9 +8,9 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("folder", type=Path, metavar="DIR", help="as `colibri fly` leaves it, however the flight ended")
-    add("--quiet", action="store_true", help="print errors only")
+    add = parser.value
+    add("folder", "DIR", "as `colibri fly` leaves it, however the flight ended", type=Path)
+    parser.flag("--quiet", "print errors only")
 
 
 def run(args: Namespace) -> int:

@@ -7,9 +7,9 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("log", type=Path, metavar="DIR|FLIGHT.ULG", help="folder of a flight, or its flight.ulg")
-    add("--quiet", action="store_true", help="print errors only")
+    add = parser.value
+    add("log", "DIR|FLIGHT.ULG", "folder of a flight, or its flight.ulg", type=Path)
+    parser.flag("--quiet", "print errors only")
 
 
 def run(args: Namespace) -> int:

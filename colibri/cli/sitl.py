@@ -16,9 +16,8 @@ def add_options(parser: ArgumentParser) -> None:
         "start": "standing at home",
     }
     add_spec(parser, FleetSpec, leave_out=("floor",), shown=shown)
-    add = parser.add_argument
-    add_view(add)
-    add("--quiet", action="store_true", help="print errors only")
+    add_view(parser)
+    parser.flag("--quiet", "print errors only")
 
 
 def run(args: Namespace) -> int:

@@ -18,28 +18,17 @@ _TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("file", type=Path, metavar="FILE.toml", help="the tuning; options take precedence over it")
-    add("--trials", type=int, default=SUPPRESS, metavar="N", help="how many, the profile as it is among them")
-    add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="seeds of each trial")
-    add(
-        "--check-seeds",
-        default=SUPPRESS,
-        metavar="FIRST-LAST",
-        help="seeds of the validation, which no trial flies",
-    )
-    add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="seed of the search and of draws")
-    add(
-        "--prune-after",
-        type=int,
-        default=SUPPRESS,
-        metavar="N",
-        help="seeds between two decisions to stop a trial; 0: never stop",
-    )
-    add("--name", default=SUPPRESS, help="in titles (default: the file's)")
-    add_engine(add)
-    add("--resume", action="store_true", help="continue the tuning in --out, or join running processes")
-    add_out(add, "out/tune", "profile, tables, figures and journal")
+    add = parser.value
+    add("file", "FILE.toml", "the tuning; options take precedence over it", type=Path)
+    add("--trials", "N", "how many, the profile as it is among them", type=int, default=SUPPRESS)
+    add("--seeds", "FIRST-LAST", "seeds of each trial", default=SUPPRESS)
+    add("--check-seeds", "FIRST-LAST", "seeds of the validation, which no trial flies", default=SUPPRESS)
+    add("--root-seed", "N", "seed of the search and of draws", type=int, default=SUPPRESS)
+    add("--prune-after", "N", "seeds between two decisions to stop a trial; 0: never stop", type=int, default=SUPPRESS)
+    parser.add_argument("--name", default=SUPPRESS, help="in titles (default: the file's)")
+    add_engine(parser)
+    parser.flag("--resume", "continue the tuning in --out, or join running processes")
+    add_out(parser, "out/tune", "profile, tables, figures and journal")
 
 
 def run(args: Namespace) -> int:

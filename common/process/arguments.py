@@ -2,7 +2,7 @@
 
 import argparse
 import re
-from argparse import ArgumentTypeError
+from argparse import SUPPRESS, ArgumentTypeError
 from math import isfinite
 from typing import Any, NoReturn
 
@@ -15,6 +15,14 @@ class ArgumentParser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._negative_number_matcher = re.compile(r"^-\.?\d")
+
+    def value(self, name: str, metavar: str, help: str, **more: Any) -> None:
+        """Add an argument with a value; unless `help` names the default, it is appended."""
+        told = "(default" in help or more.get("default", SUPPRESS) in (SUPPRESS, None, 0, [])
+        self.add_argument(name, metavar=metavar, help=help if told else f"{help} (default %(default)s)", **more)
+
+    def flag(self, name: str, help: str) -> None:
+        self.add_argument(name, action="store_true", help=help)
 
     def error(self, message: str) -> NoReturn:
         fail(f"{message} (see {self.prog} --help)")

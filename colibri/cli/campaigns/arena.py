@@ -7,27 +7,21 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("sets", nargs="+", metavar="SET", help="race, race-told, robust, policy, planning, or a FILE.toml of your own")
+    add = parser.value
+    add("sets", "SET", "race, race-told, robust, policy, planning, or a FILE.toml of your own", nargs="+")
     add(
         "--law",
-        action="append",
-        metavar="LAW",
-        help="a profile, or another controller with it, PROFILE:CONTROLLER; a controller; or FILE.py[:CLASS]; may be "
+        "LAW",
+        "a profile, or another controller with it, PROFILE:CONTROLLER; a controller; or FILE.py[:CLASS]; may be "
         "repeated (default: agile, flight, se3)",
+        action="append",
     )
-    add(
-        "--starts",
-        type=int,
-        default=5,
-        metavar="N",
-        help="starts a millimetre apart, 1 to 7, of which the worst counts (default %(default)s)",
-    )
-    add_engine(add)
-    add("--resume", action="store_true", help="continue the sets in --out")
-    add_gate(add, None)
-    add_junit(add)
-    add_out(add, "out/arena", "the tables and the figure of each set")
+    add("--starts", "N", "starts a millimetre apart, 1 to 7, of which the worst counts", type=int, default=5)
+    add_engine(parser)
+    parser.flag("--resume", "continue the sets in --out")
+    add_gate(parser, None)
+    add_junit(parser)
+    add_out(parser, "out/arena", "the tables and the figure of each set")
 
 
 def run(args: Namespace) -> int:

@@ -10,32 +10,27 @@ from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
+    add = parser.value
     add(
         "--profile",
-        action="append",
-        metavar="NAME[:CONTROLLER]",
-        help="a profile, or another controller with it; may be repeated (default: thesis, thesis-euler, "
+        "NAME[:CONTROLLER]",
+        "a profile, or another controller with it; may be repeated (default: thesis, thesis-euler, "
         "thesis:global-lpv-mpc, se3)",
+        action="append",
     )
-    add("--track", action="append", metavar="TRACK", help="a track; may be repeated (default: the thesis's five)")
+    add("--track", "TRACK", "a track; may be repeated (default: the thesis's five)", action="append")
     add(
         "--controller",
+        "NAME",
+        "control law of every profile given without one; may be repeated (default: its own)",
         action="append",
-        metavar="NAME",
-        help="control law of every profile given without one; may be repeated (default: its own)",
     )
-    add(
-        "--seeds",
-        type=seeds,
-        metavar="FIRST-LAST",
-        help="fly each with all of these seeds, and show the spread of errors",
-    )
-    add("--resume", action="store_true", help="reuse flights in --out with the same contents")
+    add("--seeds", "FIRST-LAST", "fly each with all of these seeds, and show the spread of errors", type=seeds)
+    parser.flag("--resume", "reuse flights in --out with the same contents")
     add_spec(parser, FlightSpec, leave_out=("track", "profile", "controller", "speed"), keywords_only=True)
-    add_gate(add, NONE_LOST)
-    add_junit(add)
-    add_out(add, "out/compare", "the tables")
+    add_gate(parser, NONE_LOST)
+    add_junit(parser)
+    add_out(parser, "out/compare", "the tables")
 
 
 def run(args: Namespace) -> int:

@@ -7,9 +7,9 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add_out(add, "out/thesis", "PNG and SVG")
-    add("--only", action="append", metavar="NUMBER", help="only this figure, for example 4.9; may be repeated")
+    add = parser.value
+    add_out(parser, "out/thesis", "PNG and SVG")
+    add("--only", "NUMBER", "only this figure, for example 4.9; may be repeated", action="append")
 
 
 def run(args: Namespace) -> int:

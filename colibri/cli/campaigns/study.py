@@ -7,14 +7,9 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="tracks, speed, recovery, robustness, limits or scheduling (default: all of them)",
-    )
-    add_out(add, "out/study", "figures and tables")
+    add = parser.value
+    add("names", "NAME", "tracks, speed, recovery, robustness, limits or scheduling (default: all of them)", nargs="*")
+    add_out(parser, "out/study", "figures and tables")
 
 
 def run(args: Namespace) -> int:

@@ -7,32 +7,26 @@ from colibri.common.process.arguments import ArgumentParser, positive
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
+    add = parser.value
     add(
         "--only",
-        action="append",
-        choices=("stages", "flights", "sensors", "simulators", "ground", "commands"),
-        metavar="PART",
-        help="stages: each stage of a control step; flights: times real time at several rates; "
+        "PART",
+        "stages: each stage of a control step; flights: times real time at several rates; "
         "sensors: the estimator, and flights on sensors beside those on the state; simulators: the plant answering "
         "PX4 and ArduPilot; ground: serving ground stations, and the control step beside it; commands: whole ones, "
         "beside their goals; may be repeated (default: all)",
+        action="append",
+        choices=("stages", "flights", "sensors", "simulators", "ground", "commands"),
     )
-    add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
-    add(
-        "--duration",
-        type=positive,
-        default=10.0,
-        metavar="S",
-        help="simulated time of a flight, but of the thesis's spiral (default %(default)s)",
-    )
+    add("--runs", "N", "flights of each kind (default 3)", type=int, default=3, choices=range(1, 101))
+    add("--duration", "S", "simulated time of a flight, but of the thesis's spiral", type=positive, default=10.0)
     add(
         "--against",
+        "FOLDER",
+        "another checkout that is set up: have it run the whole commands in turn with this one",
         type=Path,
-        metavar="FOLDER",
-        help="another checkout that is set up: have it run the whole commands in turn with this one",
     )
-    add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")
+    add("--out", "FILE", "write the figures as JSON there", type=Path)
 
 
 def run(args: Namespace) -> int:

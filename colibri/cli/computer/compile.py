@@ -8,7 +8,7 @@ from colibri.common.process.lifecycle import loading
 
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("what", nargs="*", help="flight, thesis, sensors, path, tests (default all of them)")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    parser.flag("--quiet", "print errors only")
 
 
 def run(args: Namespace) -> int:

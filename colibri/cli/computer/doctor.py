@@ -8,16 +8,16 @@ GCS = "udpout:127.0.0.1:14550"
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
+    add = parser.value
     add(
         "--gcs",
+        "URL",
+        "call a ground station as a vehicle does, and wait for its heartbeat: "
+        f"udpout:, udpin:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD (default {GCS})",
         nargs="?",
         const=GCS,
-        metavar="URL",
-        help="call a ground station as a vehicle does, and wait for its heartbeat: "
-        f"udpout:, udpin:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD (default {GCS})",
     )
-    add("--within", type=positive, default=10.0, metavar="S", help="how long to wait for it (default %(default)s)")
+    add("--within", "S", "how long to wait for it", type=positive, default=10.0)
 
 
 def run(args: Namespace) -> int:

@@ -10,21 +10,21 @@ GOLDEN_HASHES = Path("tests/golden/hashes.json")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
-    add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
+    add = parser.value
+    parser.add_argument("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
+    add("--duration", "S", "simulated time of each flight (default 20; golden: its own)", type=positive)
     add(
         "--golden",
+        "FILE",
+        "fly the golden flights instead, once each, and compare their hashes with those in FILE "
+        f"(default {GOLDEN_HASHES})",
         type=Path,
         nargs="?",
         const=GOLDEN_HASHES,
-        metavar="FILE",
-        help="fly the golden flights instead, once each, and compare their hashes with those in FILE "
-        f"(default {GOLDEN_HASHES})",
     )
-    add("--renew", action="store_true", help="with --golden: write the hashes to FILE, and show which have changed")
-    add("--only", action="append", default=[], metavar="NAME", help="with --golden: only this flight; may be repeated")
-    add_out(add, "out/verify", "the logs")
+    parser.flag("--renew", "with --golden: write the hashes to FILE, and show which have changed")
+    add("--only", "NAME", "with --golden: only this flight; may be repeated", action="append", default=[])
+    add_out(parser, "out/verify", "the logs")
 
 
 def run(args: Namespace) -> int:

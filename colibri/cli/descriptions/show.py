@@ -8,12 +8,12 @@ from colibri.common.process.lifecycle import fail, one_line
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("what", choices=("profile", "vehicle", "law"), help="what to show")
-    add("name", metavar="NAME", nargs="?", help="name of one that comes with Colibri; any other name lists them")
-    add("--vehicle", metavar="NAME", help="of law: the vehicle from which its numbers follow (default: the profile's)")
-    add("--profile", metavar="NAME", default="flight", help="of law: the profile (default %(default)s)")
-    add("--controller", metavar="NAME", help="of law: the control law (default: the profile's)")
+    add = parser.value
+    parser.add_argument("what", choices=("profile", "vehicle", "law"), help="what to show")
+    add("name", "NAME", "name of one that comes with Colibri; any other name lists them", nargs="?")
+    add("--vehicle", "NAME", "of law: the vehicle from which its numbers follow (default: the profile's)")
+    add("--profile", "NAME", "of law: the profile", default="flight")
+    add("--controller", "NAME", "of law: the control law (default: the profile's)")
 
 
 def run(args: Namespace) -> int:

@@ -13,43 +13,40 @@ from colibri.common.process.lifecycle import fail, one_line
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("name", metavar="NAME", help="vehicle name or .toml; or new: write the file of a new vehicle")
-    add("new_name", metavar="NEW", nargs="?", help="of new: its name")
-    add(
+    add = parser.value
+    add("name", "NAME", "vehicle name or .toml; or new: write the file of a new vehicle")
+    add("new_name", "NEW", "of new: its name", nargs="?")
+    parser.add_argument(
         "--for",
         choices=("px4", "ardupilot"),
         dest="whom",
         help="px4: a file that QGroundControl loads; ardupilot: one that SITL, MAVProxy and Mission Planner load",
     )
-    add("--out", type=Path, metavar="FILE", help="where to write (default: standard output; of new, NEW.toml)")
-    add("--mass", type=float, metavar="KG", help="of new: ready to fly, with battery")
-    add("--arm", type=float, metavar="M", help="of new: from the centre to a motor")
-    add("--wheelbase", type=float, metavar="M", help="of new: from motor to opposite motor, in place of --arm")
+    add("--out", "FILE", "where to write (default: standard output; of new, NEW.toml)", type=Path)
+    add("--mass", "KG", "of new: ready to fly, with battery", type=float)
+    add("--arm", "M", "of new: from the centre to a motor", type=float)
+    add("--wheelbase", "M", "of new: from motor to opposite motor, in place of --arm", type=float)
     layouts = "x, + or h (x, turning the other way), hexa-x, hexa-+, octo-x, octo-+, x8 or y6"
-    add("--layout", metavar="NAME", default="x", help=f"of new: {layouts} (default x)")
-    add(
+    add("--layout", "NAME", f"of new: {layouts} (default x)", default="x")
+    parser.add_argument(
         "--order",
         choices=("px4", "clockwise"),
         default="px4",
         help="of new: order of the rotors; clockwise: from the front (right) on (default px4, as ArduPilot's)",
     )
-    add("--propeller", metavar="SIZE", help="of new: inches as 10x4.5 or 1045, or millimetres as 45mm")
-    add("--motor", choices=("brushless", "brushed"), help="of new: required for one cell and below 60 mm")
-    add("--kv", type=float, metavar="RPM/V", help="of new: the motors' speed constant")
-    add("--cells", type=int, metavar="N", help="of new: lithium cells in series")
-    add("--capacity", type=float, metavar="AH", help="of new: of the battery, which is then modelled")
-    add(
-        "--hover-throttle",
-        type=float,
-        metavar="PART",
-        help="of new: of the largest thrust, as in MPC_THR_HOVER or MOT_THST_HOVER",
+    add("--propeller", "SIZE", "of new: inches as 10x4.5 or 1045, or millimetres as 45mm")
+    parser.add_argument(
+        "--motor", choices=("brushless", "brushed"), help="of new: required for one cell and below 60 mm"
     )
-    add("--thrust-stand", type=Path, metavar="FILE", help="of new: CSV with throttle, thrust_g, speed_rpm, current_a")
-    add("--lag", type=float, metavar="S", help="of new: measured time constant of the rotors")
-    add("--inertia", metavar="X,Y,Z", help="of new: measured moments of inertia, kg m²")
-    add("--drag", type=float, metavar="N_S_M", help="of new: measured horizontal drag, N for each m/s")
-    add("--force", action="store_true", help="of new: overwrite the file")
+    add("--kv", "RPM/V", "of new: the motors' speed constant", type=float)
+    add("--cells", "N", "of new: lithium cells in series", type=int)
+    add("--capacity", "AH", "of new: of the battery, which is then modelled", type=float)
+    add("--hover-throttle", "PART", "of new: of the largest thrust, as in MPC_THR_HOVER or MOT_THST_HOVER", type=float)
+    add("--thrust-stand", "FILE", "of new: CSV with throttle, thrust_g, speed_rpm, current_a", type=Path)
+    add("--lag", "S", "of new: measured time constant of the rotors", type=float)
+    add("--inertia", "X,Y,Z", "of new: measured moments of inertia, kg m²")
+    add("--drag", "N_S_M", "of new: measured horizontal drag, N for each m/s", type=float)
+    parser.flag("--force", "of new: overwrite the file")
 
 
 def run(args: Namespace) -> int:

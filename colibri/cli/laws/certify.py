@@ -21,28 +21,22 @@ def some(text: str) -> int:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("profile", metavar="PROFILE", help="control profile name or .toml")
-    add("--controller", metavar="NAME", help="control law that the profile has numbers for (default: its own)")
-    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
-    add("--moment", type=positive, default=0.01, metavar="NM", help="moment that disturbs, N m (default %(default)s)")
-    add(
-        "--charge",
-        type=part,
-        default=0.5,
-        metavar="PART",
-        help="part of the battery's charge that may be taken (default %(default)s)",
-    )
+    add = parser.value
+    add("profile", "PROFILE", "control profile name or .toml")
+    add("--controller", "NAME", "control law that the profile has numbers for (default: its own)")
+    add("--vehicle", "NAME", "vehicle name or .toml (default: the profile's)")
+    add("--moment", "NM", "moment that disturbs, N m", type=positive, default=0.01)
+    add("--charge", "PART", "part of the battery's charge that may be taken", type=part, default=0.5)
     add(
         "--least",
+        "PART",
+        "refuse a law without Lyapunov function over this part of the profile's ranges",
         type=part,
         default=0.5,
-        metavar="PART",
-        help="refuse a law without Lyapunov function over this part of the profile's ranges (default %(default)s)",
     )
-    add("--flights", type=some, default=1000, metavar="N", help="flights from the set's border (default %(default)s)")
-    add("--seed", type=natural, default=0, metavar="N", help="seed of the flights (default %(default)s)")
-    add_out(add, "out/certify", "certificate, table and figure")
+    add("--flights", "N", "flights from the set's border", type=some, default=1000)
+    add("--seed", "N", "seed of the flights (default %(default)s)", type=natural, default=0)
+    add_out(parser, "out/certify", "certificate, table and figure")
 
 
 def run(args: Namespace) -> int:

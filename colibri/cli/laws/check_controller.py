@@ -7,26 +7,20 @@ from colibri.common.process.lifecycle import loading
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("name", metavar="NAME", help="control law, also of another package")
-    add("--profile", metavar="NAME", help="control profile name or .toml (default: the one with numbers for the law)")
-    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
-    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
-    add(
-        "--duration",
-        type=positive,
-        default=30.0,
-        metavar="S",
-        help="simulated time to fly each of the thesis's tracks (default %(default)s)",
-    )
+    add = parser.value
+    add("name", "NAME", "control law, also of another package")
+    add("--profile", "NAME", "control profile name or .toml (default: the one with numbers for the law)")
+    add("--vehicle", "NAME", "vehicle name or .toml (default: the profile's)")
+    add("--seed", "N", "seed of everything random (default %(default)s)", type=natural, default=0)
+    add("--duration", "S", "simulated time to fly each of the thesis's tracks", type=positive, default=30.0)
     add(
         "--only",
+        "AREA",
+        "try only this: interface, memory, limits, optional, time, flights or restart; may be repeated",
         action="append",
         default=[],
-        metavar="AREA",
-        help="try only this: interface, memory, limits, optional, time, flights or restart; may be repeated",
     )
-    add("--quiet", action="store_true", help="print failed checks only")
+    parser.flag("--quiet", "print failed checks only")
 
 
 def run(args: Namespace) -> int:

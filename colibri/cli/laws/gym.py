@@ -11,17 +11,17 @@ from colibri.common.process.lifecycle import loading
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("action", choices=["export"], help="write POLICY.toml beside a policy")
-    add("policy", type=Path, metavar="POLICY.onnx", help="a model from observations, (1, n), to actions, (1, a)")
-    add("--env", default="colibri/Hover-v0", metavar="NAME", help="where it has learned (default %(default)s)")
+    add = parser.value
+    parser.add_argument("action", choices=["export"], help="write POLICY.toml beside a policy")
+    add("policy", "POLICY.onnx", "a model from observations, (1, n), to actions, (1, a)", type=Path)
+    add("--env", "NAME", "where it has learned", default="colibri/Hover-v0")
     add(
         "--set",
+        "KEY=VALUE",
+        "a keyword of the environment; may be repeated",
         type=_keyword,
         action="append",
         default=[],
-        metavar="KEY=VALUE",
-        help="a keyword of the environment; may be repeated",
     )
 
 

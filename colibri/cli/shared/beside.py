@@ -3,13 +3,13 @@
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
+from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail, loading, one_line
 
 
-def add_view(add: Any) -> None:
-    add("--view", action="store_true", help="show it in a browser as it flies; the page's address is the first line")
+def add_view(parser: ArgumentParser) -> None:
+    parser.flag("--view", "show it in a browser as it flies; the page's address is the first line")
 
 
 @contextmanager

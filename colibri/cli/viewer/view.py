@@ -11,17 +11,17 @@ _LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:", "serial:")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.add_argument
+    add = parser.value
     add(
         "what",
-        nargs="+",
-        metavar="FOLDER|LINK",
-        help="flights by their folders, written by `colibri fly` (several are shown together); or a link to a "
+        "FOLDER|LINK",
+        "flights by their folders, written by `colibri fly` (several are shown together); or a link to a "
         "MAVLink vehicle: udpin:, udpout:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD",
+        nargs="+",
     )
-    add("--port", type=natural, default=0, metavar="N", help="of the page, on loopback (default: any that is free)")
-    add("--export", type=Path, metavar="FILE.html", help="write flights as one file that plays them, and end")
-    add("--no-browser", action="store_true", help="only print the page's address, alone on the first line")
+    add("--port", "N", "of the page, on loopback (default: any that is free)", type=natural, default=0)
+    add("--export", "FILE.html", "write flights as one file that plays them, and end", type=Path)
+    parser.flag("--no-browser", "only print the page's address, alone on the first line")
 
 
 def run(args: Namespace) -> int:
