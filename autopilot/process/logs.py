@@ -23,7 +23,6 @@ from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import ERROR, INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog import messages
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import (
     COMMAND,
@@ -36,12 +35,10 @@ from colibri.mavlink.ulog.flight_topics import (
     split,
 )
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
-from colibri.mavlink.ulog.log import FileLog, TopicLog
+from colibri.mavlink.ulog.log import FileLog, TopicLog, beginning
 from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
-from colibri.mavlink.ulog.samples import SampleBlocks
-from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
-from colibri.mavlink.ulog.status import VehicleStatus, status_message
+from colibri.mavlink.ulog.samples import SampleBlocks, SensingBlocks, VehicleStatus, sensing_numbers, status_message
 
 MAX_RECEIVED_BYTES = 64 << 20
 """Limit of what stations send in the log of a flight: a flood must not fill the disk."""

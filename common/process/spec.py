@@ -11,21 +11,14 @@ from colibri.common.process.lifecycle import end_with, fail
 from colibri.common.spec import Option, SpecError, from_json, from_namespace
 
 S = TypeVar("S")
+_BOOT = "Unix time at simulated time 0, for the dates of telemetry logs; the same for plant and autopilot"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessSpec:
     system_id: Annotated[int, Option("MAVLink system", "ID", least=1, most=255)] = 1
     out: Annotated[Path | None, Option("write flight.ulg there", "DIR")] = None
-    boot_unix_us: Annotated[
-        int,
-        Option(
-            "Unix time at simulated time 0, for the dates of telemetry logs; the same for plant and autopilot",
-            "N",
-            "µs",
-            least=0,
-        ),
-    ] = 0
+    boot_unix_us: Annotated[int, Option(_BOOT, "N", "µs", least=0)] = 0
 
 
 class Starter(NamedTuple):

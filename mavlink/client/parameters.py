@@ -18,15 +18,8 @@ _BELIEVED_AFTER = 3  # requests before a different value counts: it may have bee
 _GAPS_AT_ONCE = 10
 _BY_NAME = -1
 _REAL: int = mav.MAV_PARAM_TYPE_REAL32
-_LAYOUTS = {
-    mav.MAV_PARAM_TYPE_UINT8: Struct("<Bxxx"),
-    mav.MAV_PARAM_TYPE_INT8: Struct("<bxxx"),
-    mav.MAV_PARAM_TYPE_UINT16: Struct("<Hxx"),
-    mav.MAV_PARAM_TYPE_INT16: Struct("<hxx"),
-    mav.MAV_PARAM_TYPE_UINT32: Struct("<I"),
-    mav.MAV_PARAM_TYPE_INT32: Struct("<i"),
-    _REAL: Struct("<f"),
-}
+_INTEGERS = ("<Bxxx", "<bxxx", "<Hxx", "<hxx", "<I", "<i")  # in the order of MAV_PARAM_TYPE
+_LAYOUTS = dict(enumerate(map(Struct, _INTEGERS), start=mav.MAV_PARAM_TYPE_UINT8)) | {_REAL: Struct("<f")}
 
 
 class Held(NamedTuple):

@@ -21,20 +21,15 @@ _SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK  # follow no link; do not
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
 
 _REFUSALS = {
-    EACCES: FileRefusal.PROTECTED,
+    **dict.fromkeys((EACCES, ELOOP, EPERM, EROFS), FileRefusal.PROTECTED),
+    **dict.fromkeys((EINVAL, ENAMETOOLONG), FileRefusal.BAD_NAME),
     EEXIST: FileRefusal.EXISTS,
-    EINVAL: FileRefusal.BAD_NAME,
     EISDIR: FileRefusal.IS_FOLDER,
-    ELOOP: FileRefusal.PROTECTED,
-    ENAMETOOLONG: FileRefusal.BAD_NAME,
     ENOENT: FileRefusal.NOT_FOUND,
     ENOSPC: FileRefusal.NO_SPACE,
     ENOTDIR: FileRefusal.NOT_A_FOLDER,
     ENOTEMPTY: FileRefusal.NOT_EMPTY,
-    EPERM: FileRefusal.PROTECTED,
-    EROFS: FileRefusal.PROTECTED,
 }
-
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 

@@ -51,6 +51,10 @@ def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custo
     return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)
 
 
+def plant_heartbeat(codec: Codec, custom_mode: int = 0) -> bytes:
+    return encode_heartbeat(codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, False, custom_mode)
+
+
 def is_another(
     sender: Address | None, peer: Address | None, silence_s: float, is_there: Callable[[Address], bool]
 ) -> bool:

@@ -178,10 +178,7 @@ class PlantEnd:
         return True
 
     def _heartbeat(self) -> bytes:
-        mode = 0 if self.waits else lockstep.FREE_RUNNING
-        return lockstep.encode_heartbeat(
-            self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False, custom_mode=mode
-        )
+        return lockstep.plant_heartbeat(self._codec, 0 if self.waits else lockstep.FREE_RUNNING)
 
     def _receive_fault(self, message: Message, *, answered: bool) -> None:
         fields = message.fields

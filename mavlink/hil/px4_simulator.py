@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Address, PerRotor, Vector
-from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US, encode_heartbeat
+from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US, plant_heartbeat
 from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors, in_i16, place_e7_mm
 from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame, actuator_frame
 from colibri.mavlink.wire import dialect
@@ -83,7 +83,7 @@ class SimulatorEnd:
         frames = [] if truth is None else [self._encode_truth(truth)]
         frames += encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
-            frames.append(self._heartbeat())
+            frames.append(plant_heartbeat(self._codec))
         self._frames = tuple(frames)
         self.answered = False
         self._send(now_s)
@@ -119,7 +119,7 @@ class SimulatorEnd:
         """Call a PX4 that waits to be called, as over UDP."""
         if self.peer is None and now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
-            self._outbox.append(((self._heartbeat(),), address))
+            self._outbox.append(((plant_heartbeat(self._codec),), address))
 
     def poll(self, now_s: float) -> None:
         if not self.answered and now_s >= self._resend_at_s:
@@ -156,9 +156,8 @@ class SimulatorEnd:
         if not isfinite(sum(controls)):
             self.dropped["invalid"] += 1
             return
-        self.motors = Motors(
-            tuple([min(max(control, 0.0), 1.0) for control in controls]), bool(mode & dialect.MODE_ARMED)
-        )
+        within = tuple([min(max(control, 0.0), 1.0) for control in controls])
+        self.motors = Motors(within, bool(mode & dialect.MODE_ARMED))
 
     def _receive_request(self, message: Message) -> None:
         fields = message.fields
@@ -168,9 +167,6 @@ class SimulatorEnd:
             return
         self._truth_every_us = round(fields.param2) if fields.param2 > 0.0 else None
         self._truth_at_us = 0
-
-    def _heartbeat(self) -> bytes:
-        return encode_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False)
 
     def _encode_truth(self, truth: Truth) -> bytes:
         state, place = truth.state, truth.place

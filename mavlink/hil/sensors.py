@@ -167,15 +167,8 @@ def decode_gps(message: Message) -> GpsFix:
 
 def _fix(numbers: Sequence[int]) -> GpsFix:
     time_us, lat, lon, alt, eph, epv, _, vn, ve, vd, _, fix_type, satellites = numbers
-    return GpsFix(
-        time_us=time_us,
-        fix_type=fix_type,
-        place=Geodetic(lat / 1e7, lon / 1e7, alt / 1e3),
-        velocity_enu_m_s=ned_from_enu((vn / 100.0, ve / 100.0, vd / 100.0)),
-        horizontal_accuracy_m=_accuracy_m(eph),
-        vertical_accuracy_m=_accuracy_m(epv),
-        satellites=satellites,
-    )
+    place, velocity = Geodetic(lat / 1e7, lon / 1e7, alt / 1e3), ned_from_enu((vn / 100.0, ve / 100.0, vd / 100.0))
+    return GpsFix(time_us, fix_type, place, velocity, _accuracy_m(eph), _accuracy_m(epv), satellites)
 
 
 def _in(value: float, scale: float, maximum: int) -> int:

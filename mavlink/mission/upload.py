@@ -8,6 +8,7 @@ Specification: https://mavlink.io/en/services/mission.html. Two choices follow P
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from colibri.mavlink.mission.items import ACCEPTED, MISSION, MissionItem, StoredPlan, fault_of, item_of, plan_name
@@ -40,30 +41,22 @@ class _Answer(NamedTuple):
     at_us: int
 
 
+@dataclass
 class _Upload:
-    def __init__(
-        self,
-        peer: Peer,
-        plan_type: int,
-        count: int,
-        now_us: int,
-        began_us: int,
-        old_form: bool | None,
-        first: int = 0,
-        replaces: Sequence[MissionItem] = (),
-    ) -> None:
-        """Take `count` items from number `first` on; of a part, `replaces` is the whole plan."""
-        self.first, self.replaces = first, replaces
-        self.peer = peer
-        self.began_us = began_us  # also of those that the channel began and replaced
-        self.plan_type = plan_type
-        self.count = count
-        self.items: list[MissionItem] = []
-        self.received_us = self.due_us = now_us
-        self.quiet = False
-        self.old_form, self.asked_in_old_form = old_form, bool(old_form)
-        self._asked = 0
-        self._last_form = False
+    peer: Peer
+    plan_type: int
+    count: int
+    received_us: int  # of the last item
+    began_us: int  # also of those that the channel began and replaced
+    old_form: bool | None  # whether items are requested by MISSION_REQUEST, if that is settled
+    first: int = 0
+    replaces: Sequence[MissionItem] = ()  # the whole plan, if items from `first` on replace a part
+    items: list[MissionItem] = field(default_factory=list)
+    due_us: int = 0
+    quiet: bool = False
+    asked_in_old_form: bool = False
+    _asked: int = 0
+    _last_form: bool = False
 
     def ask(self, now_us: int) -> Send:
         """Request the next item, first in the new form: some nack MISSION_REQUEST (MAVSDK), some require it."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.services.statustext import ERROR, INFO, WARNING, StatusText
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import Message, bits, mav
 from colibri.mavlink.wire.refusal import Refusal
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
@@ -28,16 +28,8 @@ PROGRESS_UNKNOWN = 0xFF  # COMMAND_ACK.progress of a pending command
 NOT_GIVEN = 2**31 - 1  # the integer x and y of a COMMAND_INT for nan in a COMMAND_LONG
 DEGREES = 1e-7
 
-GLOBAL_FRAMES: frozenset[int] = frozenset(
-    (
-        mav.MAV_FRAME_GLOBAL,
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        mav.MAV_FRAME_GLOBAL_INT,
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
-    )
-)
+_GLOBAL = ("GLOBAL", "GLOBAL_RELATIVE_ALT", "GLOBAL_TERRAIN_ALT")
+GLOBAL_FRAMES = frozenset(bits("MAV_FRAME_", name + suffix) for name in _GLOBAL for suffix in ("", "_INT"))
 """Frames with latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name ends
 in INT, as all clients send them.
 """

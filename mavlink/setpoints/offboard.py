@@ -23,7 +23,7 @@ from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import HomePosition
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import Message, bits, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from colibri.mavlink.wire.places import ABOVE_SEA, MAX_DISTANCE_M, read_place
 from colibri.mavlink.wire.refusal import Refusal
@@ -39,11 +39,7 @@ _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
 _FORCE: int = mav.POSITION_TARGET_TYPEMASK_FORCE_SET
 _NO_YAW: int = mav.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 _NO_YAW_RATE: int = mav.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
-_NO_RATE: tuple[int, int, int] = (
-    mav.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE,
-    mav.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE,
-    mav.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE,
-)
+_NO_RATE = [bits("ATTITUDE_TARGET_TYPEMASK_BODY_", f"{axis}_RATE_IGNORE") for axis in ("ROLL", "PITCH", "YAW")]
 _NO_THRUST: int = mav.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_ATTITUDE: int = mav.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 

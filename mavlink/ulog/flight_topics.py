@@ -82,36 +82,24 @@ class Topic:
         return runs
 
 
-_STATE = (
-    Columns("u v w", "m/s", "velocity, FLU"),
-    Columns("p q r", "rad/s", "body rates, FLU"),
-    Columns("x y z", "m", "position, ENU"),
-    Columns("qw qx qy qz", "", "attitude quaternion wxyz, FLU to ENU"),
-)
-_ROTORS = Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed")
+_RATES = Columns("p q r", "rad/s", "body rates, FLU")
+_ATTITUDE = Columns("qw qx qy qz", "", "attitude quaternion wxyz, FLU to ENU")
 _POSITION = Columns("x y z", "m", "position, ENU")
 _VELOCITY = Columns("vx vy vz", "m/s", "velocity, ENU")
-_RATES, _ATTITUDE = _STATE[1], _STATE[3]
 
 TRUTH = Topic(
-    "colibri_truth",
-    101,
-    "plant.csv",
-    "a frame: the truth",
-    (
-        *_STATE,
-        _ROTORS,
+    *("colibri_truth", 101, "plant.csv", "a frame: the truth"),
+    columns=(
+        *(Columns("u v w", "m/s", "velocity, FLU"), _RATES, _POSITION, _ATTITUDE),
+        Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed"),
         Columns("voltage_v", "V", "battery voltage under load, or `nan`"),
         Columns("charge_ah", "Ah", "charge drawn from the battery"),
         Columns("wind_east wind_north wind_up", "m/s", "wind at the vehicle, with turbulence and gusts"),
     ),
 )
 DECISION = Topic(
-    "colibri_decision",
-    102,
-    "autopilot.csv",
-    "a control sample: the decision",
-    (
+    *("colibri_decision", 102, "autopilot.csv", "a control sample: the decision"),
+    columns=(
         Columns("phi_ref theta_ref psi_ref", "rad", "attitude setpoint"),
         Columns("qp_status", "", "how the QP ended", "int8_t"),
         Columns("fallback", "", "fallback used instead", "int8_t"),
@@ -131,11 +119,8 @@ DECISION = Topic(
 MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")
 """Kinds of measurements of an estimator, in the order of the columns of `FILTER`."""
 ESTIMATE = Topic(
-    "colibri_estimate",
-    103,
-    "estimate.csv",
-    "a control sample on sensors: the estimate",
-    (
+    *("colibri_estimate", 103, "estimate.csv", "a control sample on sensors: the estimate"),
+    columns=(
         *(_POSITION, _VELOCITY, _ATTITUDE, _RATES),
         Columns("sd_x sd_y sd_z", "m", "standard deviation of the position"),
         Columns("sd_vx sd_vy sd_vz", "m/s", "standard deviation of the velocity"),
@@ -148,11 +133,8 @@ ESTIMATE = Topic(
     ),
 )
 FILTER = Topic(
-    "colibri_filter",
-    104,
-    "filter.csv",
-    "a tenth of a second on sensors: state and covariance of the filter",
-    (
+    *("colibri_filter", 104, "filter.csv", "a tenth of a second on sensors: state and covariance of the filter"),
+    columns=(
         *(_POSITION, _VELOCITY, _ATTITUDE),
         Columns(
             " ".join(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
@@ -168,29 +150,30 @@ FILTER = Topic(
     ),
 )
 COMMAND = Topic(
-    "colibri_command",
-    105,
-    "command.csv",
-    "a frame that was answered: the command",
-    (
+    *("colibri_command", 105, "command.csv", "a frame that was answered: the command"),
+    columns=(
         Columns("control1 control2 control3 control4", "", "rotor speeds relative to the largest", "float"),
         Columns("armed", "", "1 if armed", "uint8_t"),
     ),
 )
 ROTORS = 4  # in `TRUTH` and `COMMAND`
 MORE_TRUTH = Topic(
-    "colibri_more_truth",
-    107,
-    "more_rotors.csv",
-    "a frame of a vehicle with more than four rotors: the others, `nan` if missing",
-    (Columns("omega5 omega6 omega7 omega8", "the vehicle's", "rotor speed"),),
+    *(
+        "colibri_more_truth",
+        107,
+        "more_rotors.csv",
+        "a frame of a vehicle with more than four rotors: the others, `nan` if missing",
+    ),
+    columns=(Columns("omega5 omega6 omega7 omega8", "the vehicle's", "rotor speed"),),
 )
 MORE_COMMAND = Topic(
-    "colibri_more_command",
-    108,
-    "more_commands.csv",
-    "a command of a vehicle with more than four rotors: the others, `nan` if missing",
-    (Columns("control5 control6 control7 control8", "", "rotor speeds relative to the largest", "float"),),
+    *(
+        "colibri_more_command",
+        108,
+        "more_commands.csv",
+        "a command of a vehicle with more than four rotors: the others, `nan` if missing",
+    ),
+    columns=(Columns("control5 control6 control7 control8", "", "rotor speeds relative to the largest", "float"),),
 )
 FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND, MORE_TRUTH, MORE_COMMAND)
 

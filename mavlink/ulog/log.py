@@ -1,8 +1,9 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from importlib.metadata import version as version_of_package
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -12,11 +13,24 @@ from colibri.common.types import Array
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.blocks import Blocks
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
+from colibri.mavlink.ulog.inputs import INPUT, INPUT_FIELDS, INPUT_NUMBER
+from colibri.mavlink.ulog.topics import NUMBERS, PARTS, TOPICS
 
 ROWS_AT_ONCE = 4096  # rows read at once: some seconds of a flight
 _QUEUED = 64
 
 RowEncoder: TypeAlias = Topic | Blocks  # encoder of a topic's rows, or of several of PX4's
+
+
+def beginning(vehicle: str, parameters: Mapping[str, int | float]) -> bytes:
+    """Return a file's formats of all topics, facts, parameters and subscriptions."""
+    own = {topic.name: topic.fields for topic in FLIGHT_TOPICS} | {INPUT: INPUT_FIELDS}
+    numbers = NUMBERS | {topic.name: topic.number for topic in FLIGHT_TOPICS} | {INPUT: INPUT_NUMBER}
+    formats = [messages.format_of(name, fields) for name, fields in {**PARTS, **TOPICS, **own}.items()]
+    facts = {"sys_name": "Colibri", "ver_hw": vehicle, "ver_sw": version_of_package("colibri-sitl")}
+    known = messages.information(facts) + messages.parameters(parameters)
+    subscriptions = [messages.subscription(name, number) for name, number in numbers.items()]
+    return b"".join([messages.header(), *formats, known, *subscriptions])
 
 
 class TopicReader(Protocol):

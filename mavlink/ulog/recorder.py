@@ -7,13 +7,10 @@ from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, TelemetrySnapshot
 from colibri.mavlink.ulog import messages, topics
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import split
-from colibri.mavlink.ulog.log import TopicLog
-from colibri.mavlink.ulog.samples import SampleBlocks
-from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
-from colibri.mavlink.ulog.status import VehicleStatus, status_message
+from colibri.mavlink.ulog.log import TopicLog, beginning
+from colibri.mavlink.ulog.samples import SampleBlocks, SensingBlocks, VehicleStatus, sensing_numbers, status_message
 from colibri.mavlink.ulog.topics import record
 
 STATUS_EVERY_US = 1_000_000

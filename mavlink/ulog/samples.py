@@ -1,14 +1,19 @@
-"""Control samples as topics: state, setpoint, commands, solver."""
+"""The vehicle as PX4's topics: control samples, sensor measurements and estimates, status with PX4's mode numbers."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.jit import compiled
 from colibri.common.types import Array
-from colibri.mavlink.ulog import topics
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.telemetry.snapshot import EstimatorState
+from colibri.mavlink.ulog import messages, topics
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw
 from colibri.mavlink.ulog.flight_topics import ROTORS
-from colibri.mavlink.ulog.topics import Records
+from colibri.mavlink.ulog.topics import Records, record
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, vehicle_type
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 COLUMNS = (
@@ -86,3 +91,79 @@ class SampleBlocks(Blocks):
         records[topics.MPC, "active_rotors"][:count] = table[:, _ACTIVE]
         records[topics.MPC, "qp_status"][:count] = table[:, _CODES]
         return records.first(count)
+
+
+SENSING_COLUMNS = (
+    *("time_us", "fx", "fy", "fz", "p", "q", "r", "flags", "horizontal_accuracy_m", "vertical_accuracy_m"),
+    *("heading_ratio", "velocity_ratio", "position_ratio", "height_ratio", "above_ground_ratio"),
+)
+"""Time (µs), specific force (m/s², FLU), rates (rad/s, FLU); ESTIMATOR_STATUS_FLAGS; standard deviations of the
+position; and the last tests' ratios, rejected above 1.
+"""
+
+_turned_sensing = Turned(SENSING_COLUMNS, INERTIAL=(frd_from_flu, "p q r fx fy fz"))
+
+
+def sensing_numbers(time_us: int, sensed: SensorFrame, estimator: EstimatorState) -> tuple[float, ...]:
+    velocity, position, height, heading, above_ground, *_ = estimator.ratios
+    return (
+        *(time_us, *sensed.specific_force_flu_m_s2, *sensed.rate_flu_rad_s, estimator.flags),
+        *(estimator.horizontal_accuracy_m, estimator.vertical_accuracy_m),
+        *(heading, velocity, position, height, above_ground),
+    )
+
+
+class SensingBlocks(Blocks):
+    def __init__(self) -> None:
+        super().__init__(len(SENSING_COLUMNS))
+        self._records = Records(BLOCK_ROWS, topics.SENSORS, topics.ESTIMATOR)
+
+    def encode(self, table: Array) -> bytes:
+        count, records = len(table), self._records
+        for topic in (topics.SENSORS, topics.ESTIMATOR):
+            records[topic, "timestamp"][:count] = table[:, :1]
+        records[topics.SENSORS, "gyro_rad"][:count] = _turned_sensing(table)
+        records[topics.ESTIMATOR, "pos_horiz_accuracy"][:count] = table[:, 8:]
+        records[topics.ESTIMATOR, "solution_status_flags"][:count] = table[:, 7:8]
+        return records.first(count)
+
+
+_DISARMED, _ARMED = 1, 2
+_ROTARY_WING = 1
+_NAV_STATES = {
+    (7, 0): 15,
+    (2, 0): 1,
+    (3, 0): 2,
+    (3, 1): 21,
+    (6, 0): 14,
+    (4, 2): 17,
+    (4, 3): 4,
+    (4, 4): 3,
+    (4, 5): 5,
+    (4, 6): 18,
+    (4, 8): 19,
+    (4, 11): 23,
+}
+"""PX4's main mode and sub mode -> its nav_state; 23, EXTERNAL1, flies a track."""
+
+
+class VehicleStatus(NamedTuple):
+    armed: bool
+    custom_mode: int  # in PX4's layout
+    failsafe: bool = False
+    armable: bool = True
+    armed_us: int = 0  # last arming; 0 before
+    takeoff_us: int = 0  # last take-off; 0 before
+
+
+def nav_state(custom_mode: int) -> int:
+    return _NAV_STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF), 31)
+
+
+def status_message(time_us: int, status: VehicleStatus, system_id: int, rotors: int = ROTORS) -> bytes:
+    mode = nav_state(status.custom_mode)
+    who = (_ROTARY_WING, vehicle_type(rotors), system_id, AUTOPILOT_COMPONENT)
+    times_us, arming = (time_us, status.armed_us, status.takeoff_us), _ARMED if status.armed else _DISARMED
+    return messages.SYNC + record(
+        *(topics.STATUS, *times_us, arming, mode, mode, *who), status.failsafe, False, False, status.armable
+    )

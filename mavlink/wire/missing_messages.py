@@ -21,7 +21,7 @@ class MessageField(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """A message without extension fields, in MAVLink's notation: "uint16_t[4] failure_flags"."""
+    """A message without extension fields, by type: "uint8_t index; uint16_t[4] failure_flags"."""
 
     id: int
     name: str
@@ -29,41 +29,30 @@ class Definition(NamedTuple):
 
     @property
     def fields(self) -> list[MessageField]:
-        found = findall(r"(\w+)(?:\[(\d+)\])? (\w+)", self.text)
-        return [MessageField(kind, name, int(length or 0)) for kind, length, name in found]
+        rows = findall(r"(\w+)(?:\[(\d+)\])?((?: \w+)+)", self.text)
+        return [MessageField(kind, name, int(length or 0)) for kind, length, names in rows for name in names.split()]
 
 
+_ESC_INFO = (
+    "uint8_t index; uint64_t time_usec; uint16_t counter; uint8_t count connection_type info; "
+    "uint16_t[4] failure_flags; uint32_t[4] error_count; int16_t[4] temperature"
+)
+_SIMSTATE = "float roll pitch yaw xacc yacc zacc xgyro ygyro zgyro; int32_t lat lng"
+_EKF = (
+    "uint16_t flags; float velocity_variance pos_horiz_variance pos_vert_variance compass_variance terrain_alt_variance"
+)
 MISSING = (
-    Definition(80, "COMMAND_CANCEL", "uint8_t target_system, uint8_t target_component, uint16_t command"),
-    Definition(
-        290,
-        "ESC_INFO",
-        "uint8_t index, uint64_t time_usec, uint16_t counter, uint8_t count, uint8_t connection_type, uint8_t info, "
-        "uint16_t[4] failure_flags, uint32_t[4] error_count, int16_t[4] temperature",
-    ),
-    Definition(
-        291, "ESC_STATUS", "uint8_t index, uint64_t time_usec, int32_t[4] rpm, float[4] voltage, float[4] current"
-    ),
-    Definition(152, "MEMINFO", "uint16_t brkval, uint16_t freemem"),
-    Definition(
-        *(163, "AHRS"),
-        "float omegaIx, float omegaIy, float omegaIz, float accel_weight, float renorm_val, float error_rp, "
-        "float error_yaw",
-    ),
-    Definition(
-        *(164, "SIMSTATE"),
-        "float roll, float pitch, float yaw, float xacc, float yacc, float zacc, float xgyro, float ygyro, "
-        "float zgyro, int32_t lat, int32_t lng",
-    ),
-    Definition(168, "WIND", "float direction, float speed, float speed_z"),
-    Definition(178, "AHRS2", "float roll, float pitch, float yaw, float altitude, int32_t lat, int32_t lng"),
-    Definition(183, "AUTOPILOT_VERSION_REQUEST", "uint8_t target_system, uint8_t target_component"),
-    Definition(
-        *(193, "EKF_STATUS_REPORT"),
-        "uint16_t flags, float velocity_variance, float pos_horiz_variance, float pos_vert_variance, "
-        "float compass_variance, float terrain_alt_variance",
-    ),
-    Definition(397, "COMPONENT_METADATA", "uint32_t time_boot_ms, uint32_t file_crc, char[100] uri"),
+    Definition(80, "COMMAND_CANCEL", "uint8_t target_system target_component; uint16_t command"),
+    Definition(290, "ESC_INFO", _ESC_INFO),
+    Definition(291, "ESC_STATUS", "uint8_t index; uint64_t time_usec; int32_t[4] rpm; float[4] voltage current"),
+    Definition(152, "MEMINFO", "uint16_t brkval freemem"),
+    Definition(163, "AHRS", "float omegaIx omegaIy omegaIz accel_weight renorm_val error_rp error_yaw"),
+    Definition(164, "SIMSTATE", _SIMSTATE),
+    Definition(168, "WIND", "float direction speed speed_z"),
+    Definition(178, "AHRS2", "float roll pitch yaw altitude; int32_t lat lng"),
+    Definition(183, "AUTOPILOT_VERSION_REQUEST", "uint8_t target_system target_component"),
+    Definition(193, "EKF_STATUS_REPORT", _EKF),
+    Definition(397, "COMPONENT_METADATA", "uint32_t time_boot_ms file_crc; char[100] uri"),
 )
 LATER = {
     "MISSION_COUNT": ("opaque_id",),

@@ -5,10 +5,9 @@ from pathlib import Path
 
 from colibri.common.process.log_files import set_aside
 from colibri.common.process.shared_log import SharedLog, remove_unused
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import MORE_TRUTH, TRUTH, split
-from colibri.mavlink.ulog.log import FileLog, TopicLog
+from colibri.mavlink.ulog.log import FileLog, TopicLog, beginning
 from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter

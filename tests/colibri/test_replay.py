@@ -11,9 +11,9 @@ from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
 from colibri.flights.replay import replay_flight
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import COMMAND
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
+from colibri.mavlink.ulog.log import beginning
 from colibri.mavlink.ulog.reader import FlightFile
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode

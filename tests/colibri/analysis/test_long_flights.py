@@ -22,9 +22,8 @@ from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan, FrameCount
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.ulog import reader
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, TRUTH
-from colibri.mavlink.ulog.log import MemoryLog
+from colibri.mavlink.ulog.log import MemoryLog, beginning
 
 A_BLOCK, SOME_ROWS, ALL_ROWS = 1, 200, 1 << 30
 SUMMARY = FrameCount(1.0, 1, 0)

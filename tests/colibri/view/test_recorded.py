@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colibri.experiments.flight import Flight, fly
-from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.log import beginning
 from colibri.view.recorded.flight import RecordedFlight
 from colibri.view.recorded.horizons import Horizons
 from colibri.view.recorded.prediction import predicted

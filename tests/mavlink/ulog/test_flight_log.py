@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from colibri.common.process.shared_log import SharedLog
 from colibri.common.types import Array
 from colibri.mavlink.ulog import messages
-from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import DECISION, FLIGHT_TOPICS, TRUTH, Topic
 from colibri.mavlink.ulog.inputs import CHUNK_BYTES, InputRecord, RecordKind, encode_input
-from colibri.mavlink.ulog.log import FileLog, MemoryLog, TopicLog, TopicReader
+from colibri.mavlink.ulog.log import FileLog, MemoryLog, TopicLog, TopicReader, beginning
 from colibri.mavlink.ulog.reader import FlightFile, LogFormatError
 
 BEGINNING = beginning("Test", {})

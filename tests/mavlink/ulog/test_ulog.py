@@ -15,14 +15,13 @@ from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 from colibri.mavlink.telemetry.snapshot import BatteryState, EstimatorState, Setpoint, SolverState, TelemetrySnapshot
-from colibri.mavlink.ulog import messages, samples, sensing, topics, truth
-from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog import messages, samples, topics, truth
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Thinning
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, TRUTH
 from colibri.mavlink.ulog.inputs import INPUT
-from colibri.mavlink.ulog.log import RowEncoder, TopicLog
+from colibri.mavlink.ulog.log import RowEncoder, TopicLog, beginning
 from colibri.mavlink.ulog.recorder import Recorder
-from colibri.mavlink.ulog.status import VehicleStatus, nav_state, status_message
+from colibri.mavlink.ulog.samples import VehicleStatus, nav_state, status_message
 
 BEGINNING = beginning("Test", {"AN_INT": 3, "A_FLOAT": 0.5})
 NUMBERS = np.random.default_rng(1)
@@ -159,7 +158,7 @@ def test_extreme_numbers_and_a_missing_battery_are_written() -> None:
 def test_sensors_and_their_estimate() -> None:
     frame = SensorFrame(0, 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.0), 1e5, 20.0)
     state = EstimatorState(831, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6), 0.75, 1.5, 0, 0)
-    log = read(encoded(sensing.SensingBlocks(), sensing.sensing_numbers(7000, frame, state)))
+    log = read(encoded(samples.SensingBlocks(), samples.sensing_numbers(7000, frame, state)))
     measured = data(log, topics.SENSORS)
     axes = "accelerometer_m_s2[0] accelerometer_m_s2[1] accelerometer_m_s2[2] gyro_rad[0] gyro_rad[1] gyro_rad[2]"
     assert fields(measured, axes) == [1.0, -2.0, -3.0, 4.0, -5.0, -6.0]
