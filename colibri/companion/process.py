@@ -5,12 +5,13 @@ import signal
 from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf
+from math import degrees, inf, isfinite
 from pathlib import Path
 from time import perf_counter, time
 from typing import Any, NamedTuple, TextIO
 
 from colibri.analysis.report import length, write_report
+from colibri.autopilot.control.interface import Fallback
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track, track_through
 from colibri.autopilot.guidance.trajectories.tracks import Track
@@ -22,11 +23,10 @@ from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
-from colibri.companion.report import report
 from colibri.companion.response_file import read_response
 from colibri.companion.setpoints import FlightSummary, LogRow
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stacks import STACKS
+from colibri.companion.stack import STACKS
 from colibri.companion.steering.references import stay_of
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
@@ -325,3 +325,40 @@ def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Pat
     if ended.in_order:
         return 0
     fail(f"{ended.why}; logs are in {out}", EXIT_FAILED)
+
+
+SETTLED_AFTER_S = 20.0
+
+
+def report(companion: Companion, summary: FlightSummary, given: dict[str, Any]) -> dict[str, Any]:
+    errors, peer, ended = companion.errors, companion.peer, companion.ended
+    return {
+        **given,
+        "stack": peer.stack.name if peer.stack else None,
+        "feedback": "the vehicle's estimate",
+        "ended": "interrupted" if ended is None else ended.why,
+        "in_order": ended is not None and ended.in_order,
+        "lost": None if ended is None or ended.in_order else ended.why,
+        "limit": companion.limit.name if companion.limit else None,
+        "phases": summary.phases,
+        "sim_time_s": errors.flown_s,
+        "wall_time_s": summary.last_s - summary.first_s,
+        "states_on_track": errors.samples,
+        "rmse_m": _finite(errors.rmse_m()),
+        "max_error_m": _finite(errors.max_m),
+        "rmse_after_20s_m": _finite(errors.rmse_m(SETTLED_AFTER_S)),
+        "control_rmse_m": _finite(errors.rmse_m()),
+        "max_tilt_deg": degrees(summary.max_tilt_rad),
+        "setpoints": summary.sent,
+        "setpoint_rate_hz": _finite(summary.rate_hz),
+        "fallbacks": {str(fallback): summary.fallbacks[fallback] for fallback in Fallback},
+        "round_trip_ms": peer.clock.round_trip_us * 1e-3,
+        "state_delay_ms": peer.state_delay_s * 1e3,
+        "max_state_age_ms": summary.max_age_s * 1e3,
+        "thrust_scale": companion.thrust_scale,
+        "parameters": peer.parameter_values,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None

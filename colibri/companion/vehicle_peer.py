@@ -5,8 +5,7 @@ from math import hypot
 from typing import NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic, enu_of
-from colibri.companion.stack import Stack
-from colibri.companion.stacks import recognised
+from colibri.companion.stack import Stack, recognised
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.clock import VehicleClock
 from colibri.mavlink.client.commands import Command, set_message_interval

@@ -8,8 +8,8 @@ if TYPE_CHECKING:
     from colibri.conformance.check import Conformance as Conformance
     from colibri.conformance.check import check_controller as check_controller
     from colibri.conformance.loop_flight import held as held
+    from colibri.conformance.loop_flight import rebuilt as rebuilt
     from colibri.conformance.loop_flight import restarted as restarted
-    from colibri.conformance.restart_checks import rebuilt as rebuilt
     from colibri.conformance.step_records import FlownStep as FlownStep
     from colibri.conformance.step_records import flown_steps as flown_steps
     from colibri.conformance.step_records import jumped as jumped

@@ -10,11 +10,10 @@ from colibri.analysis.tables import markdown, print_table
 from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, one_line
 from colibri.conformance.flight_checks import flight_checks, time_checks
-from colibri.conformance.interface_checks import interface_checks
-from colibri.conformance.limit_checks import limit_checks
+from colibri.conformance.interface_checks import interface_checks, limit_checks
+from colibri.conformance.loop_flight import restart_checks
 from colibri.conformance.memory_checks import memory_checks
 from colibri.conformance.optional_checks import optional_checks
-from colibri.conformance.restart_checks import restart_checks
 from colibri.conformance.subject import Check, Result, Row, Subject
 from colibri.experiments.notebook import table_html
 
@@ -101,7 +100,7 @@ def check_controller(
         for area, check in CHECKS.items():
             if not only or area in only:
                 progress(area)
-                yield from check(subject)
+                yield from (row._replace(area=area) for row in check(subject))
 
     flown_by = f"profile {subject.profile.name}, vehicle {subject.vehicle.name}, seed {seed}"
     return Conformance(subject.name, flown_by, tuple(rows()))

@@ -12,7 +12,6 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.conformance.step_records import fly_for_steps
 from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 
-AREA, TIME_AREA = "flights", "time"
 _HOVER_S, _MAX_DRIFT_M = 8.0, 0.5
 """Permitted drift in calm air, from rest on the point."""
 _WIND, _WIND_S = "5@270", 12.0
@@ -38,7 +37,7 @@ def flight_checks(subject: Subject) -> Iterator[Row]:
     for track in THESIS_TRACKS:
         yield _flown(subject, track, f"{track}, {subject.duration_s:g} s", duration=subject.duration_s)
     if subject.vehicle.drag is None:
-        yield not_applicable(AREA, "hover in wind of 5 m/s", f"{subject.vehicle.name} has no drag")
+        yield not_applicable("hover in wind of 5 m/s", f"{subject.vehicle.name} has no drag")
     else:
         yield _flown(
             subject,
@@ -57,12 +56,12 @@ def time_checks(subject: Subject) -> Iterator[Row]:
     seconds = max(_TIMED_S, _TIMED * interval_us * 1e-6)
     steps = fly_for_steps(subject, "lemniscate:lap=20", duration=seconds).steps[_UNTIMED:]
     if not steps:
-        yield not_applicable(TIME_AREA, "a step", "it took too few")
+        yield not_applicable("a step", "it took too few")
         return
     p50_us, p99_us = np.percentile([1e6 * step.took_s for step in steps], (50, 99))
     part = p99_us / interval_us
     found = f"p50 {p50_us:.0f} µs, p99 {p99_us:.0f} µs: {part:.2g} of its {interval_us / 1000:g} ms"
-    yield Row(TIME_AREA, f"{len(steps)} steps", Result.FIGURE, found)
+    yield Row("", f"{len(steps)} steps", Result.FIGURE, found)
 
 
 def _hover(subject: Subject) -> Row:
@@ -72,13 +71,13 @@ def _hover(subject: Subject) -> Row:
     drifts = f"{furthest_m:.2f} m off its point: expected at most {_MAX_DRIFT_M:g} m"
     failure = flown.lost or (drifts if not furthest_m <= _MAX_DRIFT_M else "")
     found = f"at most {_length(furthest_m)} off"
-    return judged(AREA, f"hover held, {_HOVER_S:g} s", failure, found, subject.command("hover", **options))
+    return judged(f"hover held, {_HOVER_S:g} s", failure, found, subject.command("hover", **options))
 
 
 def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
     flown = fly(subject, track, **options)
     found = f"RMS {_length(flown.rms_m)} after {options['duration'] * 2.0 / 3.0:.3g} s"
-    return judged(AREA, tried, flown.lost, found, subject.command(track, **options))
+    return judged(tried, flown.lost, found, subject.command(track, **options))
 
 
 def fly(subject: Subject, track: str, **options: Any) -> FlownDistance:

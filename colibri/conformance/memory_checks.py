@@ -13,7 +13,6 @@ from colibri.common.types import Array
 from colibri.conformance.step_records import FlownStep, fly_for_steps, own_copy
 from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 
-AREA = "memory"
 _TRACK, _OTHER = "lemniscate:lap=10,height=5", "hover:height=3"
 _S, _SAMPLES = 0.6, 8
 """Duration, and least number of samples."""
@@ -36,21 +35,21 @@ def memory_checks(subject: Subject) -> Iterator[Row]:
     steps = fly_for_steps(subject, _TRACK, **options).steps
     others = fly_for_steps(subject, _OTHER, start=subject.start(phi=20.0, vx=1.0), duration=seconds).steps
     if not steps or not others:
-        yield not_applicable(AREA, "steps taken again", "it took no step")
+        yield not_applicable("steps taken again", "it took no step")
         return
     count = f"{len(steps)} steps"
     for trial in _TRIALS:
         at, failure = _difference(trial.take(subject, steps, others))
-        yield judged(AREA, trial.tried, failure, count, subject.snippet(trial.code.format(k=at), _TRACK, **options))
+        yield judged(trial.tried, failure, count, subject.snippet(trial.code.format(k=at), _TRACK, **options))
     changed = [k for k, step in enumerate(steps) if step.changed]
     failure = f"it writes to them, at step {changed[0]} first" if changed else ""
     see = subject.snippet("print([k for k, a in enumerate(s) if a.changed])", _TRACK, **options)
-    yield judged(AREA, "references left as they are", failure, count, see)
+    yield judged("references left as they are", failure, count, see)
     now = (np.array(step.decision.rotor_speeds) for step in steps)
     late = any(step.rotor_speeds.tobytes() != speeds.tobytes() for step, speeds in zip(steps, now, strict=True))
     failure = "it overwrites the rotor speeds that it has returned: return a new array" if late else ""
     see = subject.snippet("print(s[0].rotor_speeds.tolist(), s[0].decision.rotor_speeds.tolist())", _TRACK, **options)
-    yield judged(AREA, "decisions left as they were", failure, count, see)
+    yield judged("decisions left as they were", failure, count, see)
     yield _plain(steps)
 
 
@@ -108,8 +107,8 @@ def _plain(steps: list[FlownStep]) -> Row:
     try:
         size = max(len(to_bytes(step.memory)) for step in steps)
     except TypeError as error:
-        return Row(AREA, tried, Result.FIGURE, f"no, after a restart it starts from initial(): {error}")
-    return Row(AREA, tried, Result.OK, f"up to {size} bytes")
+        return Row("", tried, Result.FIGURE, f"no, after a restart it starts from initial(): {error}")
+    return Row("", tried, Result.OK, f"up to {size} bytes")
 
 
 _TRIALS = (

@@ -9,13 +9,11 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand
 from colibri.autopilot.control.registry import in_words
 from colibri.conformance import interface_checks as interface
-from colibri.conformance.interface_checks import Protocol, has
-from colibri.conformance.limit_checks import out_of_limits
+from colibri.conformance.interface_checks import Protocol, has, out_of_limits
 from colibri.conformance.loop_flight import HELD_S, hold
 from colibri.conformance.step_records import FlownStep, fly_for_steps
 from colibri.conformance.subject import Row, Subject, judged, not_applicable
 
-AREA = "optional"
 _TRACK = "hover:height=3"
 _S, _SAMPLES = 0.3, 4
 _CLOSE = 1e-9
@@ -35,12 +33,12 @@ def optional_checks(subject: Subject) -> Iterator[Row]:
     for protocol, examine in _EXAMINED.items():
         tried = f"{protocol.members[0]}: {protocol.what}"
         if not has(law, protocol):
-            yield not_applicable(AREA, tried, "the law has none")
+            yield not_applicable(tried, "the law has none")
         elif not steps:
-            yield not_applicable(AREA, tried, "it took no step")
+            yield not_applicable(tried, "it took no step")
         else:
             failure, code = examine(subject, law, steps)
-            yield judged(AREA, tried, failure, "consistent", subject.snippet(code, _TRACK, **options))
+            yield judged(tried, failure, "consistent", subject.snippet(code, _TRACK, **options))
 
 
 def _charge(subject: Subject, law: Any, steps: list[FlownStep]) -> str:

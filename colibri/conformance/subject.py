@@ -128,7 +128,7 @@ class Result(StrEnum):
 
 
 class Row(NamedTuple):
-    """One trial; `see` is a command, or Python, that shows its failure."""
+    """One trial; `see` is a command, or Python, that shows its failure. `check_controller` adds the area."""
 
     area: str
     tried: str
@@ -141,11 +141,9 @@ Check: TypeAlias = Callable[[Subject], Iterator[Row]]
 """Yields the rows of one area."""
 
 
-def judged(area: str, tried: str, failure: str, found: str, see: str) -> Row:
-    if failure:
-        return Row(area, tried, Result.FAILED, failure, see)
-    return Row(area, tried, Result.OK, found)
+def judged(tried: str, failure: str, found: str, see: str) -> Row:
+    return Row("", tried, Result.FAILED, failure, see) if failure else Row("", tried, Result.OK, found)
 
 
-def not_applicable(area: str, tried: str, why: str) -> Row:
-    return Row(area, tried, Result.NOT_APPLICABLE, why)
+def not_applicable(tried: str, why: str) -> Row:
+    return Row("", tried, Result.NOT_APPLICABLE, why)

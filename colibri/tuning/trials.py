@@ -1,5 +1,7 @@
 """The trials of a tuning: an Optuna study in a shared journal."""
 
+import fcntl
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,13 +11,69 @@ from warnings import catch_warnings, simplefilter
 
 from numpy.random import SeedSequence
 
+from colibri.common.files import regular
 from colibri.tuning.definition import Tuning
-from colibri.tuning.file_lock import FileLock, JournalLock
 from colibri.tuning.space import TuningError, as_tried, distribution
 
 if TYPE_CHECKING:
     from optuna import Study, Trial
     from optuna.trial import FrozenTrial
+
+
+class FileLock:
+    """An exclusive lock on a folder or a file, which is created if missing."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: int | None = None
+
+    def acquire(self, *, wait: bool = True) -> bool:
+        how = os.O_RDONLY if self._path.is_dir() else os.O_RDWR | os.O_CREAT
+        opened = os.open(self._path, how | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            os.close(opened)
+            return False
+        self._file = opened
+        return True
+
+    def release(self) -> None:
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def __enter__(self) -> Self:
+        self.acquire()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.release()
+
+
+class JournalLock(FileLock):
+    """A writer's lock on a journal; removes the incomplete last line of a dead one."""
+
+    def __init__(self, journal: Path) -> None:
+        super().__init__(journal.with_name(f"{journal.name}.lock"))
+        self._journal = journal
+
+    def acquire(self, *, wait: bool = True) -> bool:
+        taken = super().acquire(wait=wait)
+        if taken:
+            _cut_off(self._journal)
+        return taken
+
+
+def _cut_off(journal: Path) -> None:
+    with open(journal, "r+b", opener=regular) as file:
+        end = file.seek(0, os.SEEK_END)
+        if end:
+            file.seek(end - 1)
+            if file.read(1) != b"\n":
+                file.seek(0)
+                file.truncate(file.read().rfind(b"\n") + 1)
+
 
 _PACKAGE = "colibri-sitl"
 JOURNAL, _LOCKS = "trials.log", "locks"

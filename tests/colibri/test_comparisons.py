@@ -15,8 +15,7 @@ from colibri.autopilot.control.registry import load_controller
 from colibri.campaigns.definition import Point
 from colibri.campaigns.engines.pool import Killed, Pool
 from colibri.cli.main import main
-from colibri.studies.compare import COLUMNS
-from colibri.studies.comparison import contenders_of, folder_name
+from colibri.studies.comparison import COLUMNS, contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 from tests.support.campaigns import Here, Hovers
 from tests.support.commands import Ran, Refused

@@ -15,7 +15,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks import HOLD
+from colibri.companion.stack import HOLD
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
 from colibri.mavlink.wire.dialect import mav

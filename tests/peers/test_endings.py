@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from colibri.companion.stacks import HOLD, OFFBOARD
+from colibri.companion.stack import HOLD, OFFBOARD
 from tests.peers.endings import CASES
 from tests.peers.programs import ALONE, program_of
 

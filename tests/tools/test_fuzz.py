@@ -10,11 +10,10 @@ from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.hostile_wire import NOW_S, HostileWire, fly
 from tools.fuzz.campaign import campaign
-from tools.fuzz.datagrams import FRAME_US, Fuzzer
-from tools.fuzz.frames import AUTOPILOT, PLANT
+from tools.fuzz.datagrams import AUTOPILOT, FRAME_US, PLANT, Fuzzer
 from tools.fuzz.ground import MAX_GROWTH_MIB, growth_mib
-from tools.fuzz.memory import NOW_S, HostileWire, fly
 
 FRAMES = 50
 

@@ -7,8 +7,7 @@ import pytest
 
 from tools.pages.__main__ import main
 from tools.pages.payload import PAYLOAD_KG, draw, fly
-from tools.pages.rotor_loss import CASES, SEEDS, table
-from tools.pages.rotor_loss_flights import RotorLossFlight
+from tools.pages.rotor_loss import CASES, SEEDS, RotorLossFlight, table
 from tools.pages.tables import with_tables
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -73,6 +73,11 @@ class Sender:
         return self("FILE_TRANSFER_PROTOCOL", 0, *TO, payload.ljust(251, b"\0"))
 
 
+def _once(messages: Callable[[Sender], list[bytes]]) -> Request:
+    """Send some messages in one frame."""
+    return lambda flight: iter([messages(Sender(flight))])
+
+
 def _parameters(*prefixes: str) -> Request:
     def request(flight: BareFlight) -> Iterator[list[bytes]]:
         send = Sender(flight)
@@ -114,11 +119,7 @@ def _upload(plan_type: int, items: list[MissionItem], first: Mapping[int, list[M
 
 
 def _files(opcode: int, path: bytes, count: int) -> Request:
-    def request(flight: BareFlight) -> Iterator[list[bytes]]:
-        send = Sender(flight)
-        yield [send.file(opcode, path, session=i) for i in range(count)]
-
-    return request
+    return _once(lambda send: [send.file(opcode, path, session=i) for i in range(count)])
 
 
 def _bursts(flight: BareFlight) -> Iterator[list[bytes]]:
@@ -140,11 +141,6 @@ def _streams(flight: BareFlight) -> Iterator[list[bytes]]:
     yield []
 
 
-def _groups(flight: BareFlight) -> Iterator[list[bytes]]:
-    send = Sender(flight)
-    yield [send("REQUEST_DATA_STREAM", *TO, 0, 1 + i % 50, 1) for i in range(200)]
-
-
 def _lists(flight: BareFlight) -> Iterator[list[bytes]]:
     for client in _others(flight):
         client.send("PARAM_REQUEST_LIST", *TO)
@@ -164,11 +160,7 @@ def _forwarded(flight: BareFlight) -> Iterator[list[bytes]]:
 
 
 def _repeated(name: str, *fields: object, count: int) -> Request:
-    def request(flight: BareFlight) -> Iterator[list[bytes]]:
-        send = Sender(flight)
-        yield [send(name, *fields) for _ in range(count)]
-
-    return request
+    return _once(lambda send: [send(name, *fields) for _ in range(count)])
 
 
 def _planned(name: str, *fields: object, count: int) -> Request:
@@ -209,11 +201,7 @@ def _reset(flight: BareFlight) -> Iterator[list[bytes]]:
 
 
 def _garbage(byte: bytes) -> Request:
-    def request(_: BareFlight) -> Iterator[list[bytes]]:
-        yield [byte * 4096][:1]
-        yield [(byte * 4096)[:4096]]
-
-    return request
+    return lambda _flight: iter([[byte * 4096]] * 2)
 
 
 def _old_frames(flight: BareFlight) -> Iterator[list[bytes]]:
@@ -270,7 +258,9 @@ REQUESTS: Mapping[str, Request] = {
     "120 times": _repeated("TIMESYNC", 0, 1, count=120),
     "50 lines of the shell": _repeated("SERIAL_CONTROL", 10, 6, 0, 0, 66, _SHELL.ljust(70, b"\0"), count=45),
     "32 stations at 250 Hz": _streams,
-    "200 groups of streams": _groups,
+    "200 groups of streams": _once(
+        lambda send: [send("REQUEST_DATA_STREAM", *TO, 0, 1 + i % 50, 1) for i in range(200)]
+    ),
     "120 pings to 32 stations": _forwarded,
     "120 requests of messages": _commands(
         mav.MAV_CMD_REQUEST_MESSAGE, mav.MAVLINK_MSG_ID_AVAILABLE_MODES, 0.0, count=95

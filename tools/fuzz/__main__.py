@@ -5,7 +5,7 @@ import sys
 
 from colibri.campaigns.engines.pool import in_order
 from colibri.common.process.arguments import seeds
-from tools.fuzz.jobs import HEADER, Job, fire
+from tools.fuzz.campaign import HEADER, Job, fire
 
 
 def main() -> int:

@@ -4,8 +4,7 @@ import random
 from collections.abc import Mapping
 
 from colibri.mavlink.wire.dialect import Codec
-from tools.fuzz.datagrams import Fuzzer
-from tools.fuzz.frames import ACTUATORS, ATTITUDE, AUTOPILOT, PLANT
+from tools.fuzz.datagrams import ACTUATORS, ATTITUDE, AUTOPILOT, PLANT, Fuzzer
 from tools.harness.relay import Relay
 
 UNREADABLE = ("malformed", "unknown", "truncated")

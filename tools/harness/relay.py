@@ -4,7 +4,6 @@ import random
 from abc import ABC, abstractmethod
 from select import select
 from threading import Event, Thread
-from types import TracebackType
 from typing import Self
 
 from tools.harness.ports import bound_socket
@@ -39,9 +38,7 @@ class Relay(ABC):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
         self._near.close()

@@ -42,6 +42,6 @@ def run(args: Namespace) -> int:
             from colibri.studies.seeds import compare_seeds
 
             return compare_seeds(args)
-        from colibri.studies.compare import compare
+        from colibri.studies.comparison import compare
 
         return compare(args)

@@ -10,7 +10,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.companion.identification import identified
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stacks import COLIBRI
+from colibri.companion.stack import COLIBRI
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
 from colibri.mavlink.wire.dialect import Codec, Message, mav

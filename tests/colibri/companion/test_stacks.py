@@ -2,8 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.companion.stack import MiddleHovers, ThrustCurve
-from colibri.companion.stacks import ARDUPILOT, COLIBRI, PX4, recognised
+from colibri.companion.stack import ARDUPILOT, COLIBRI, PX4, MiddleHovers, ThrustCurve, recognised
 from colibri.mavlink.wire.dialect import mav
 
 
