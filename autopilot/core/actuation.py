@@ -12,33 +12,25 @@ from colibri.plant.vehicle.description import Rotors, Vehicle
 
 
 class SolveTime:
-    """Simulates a slow control law: a decision takes effect a declared time after its sample.
-
-    Until then the last command is held, and due samples are skipped. The same declared time gives the same flight.
-
-    Attributes:
-        missed: Number of decisions that took longer than a control interval.
-    """
+    """Simulates a slow control law: the last command holds, and due samples are skipped, until a decision is ready."""
 
     def __init__(self, interval_us: int, stopped: PerRotor) -> None:
         self._interval_us = interval_us
         self._ready_us: int | None = None
         self._next = self._now = stopped
-        self.missed = 0
+        self.missed = 0  # decisions that took longer than a control interval
 
     def busy(self, now_us: int) -> bool:
-        """Whether a decision of an earlier sample is still being made."""
         self.controls(now_us)
         return self._ready_us is not None
 
     def decided(self, controls: PerRotor, now_us: int, solve_us: int) -> None:
-        """Set the command of the sample at `now_us`, in effect after `solve_us`."""
         if solve_us > self._interval_us:
             self.missed += 1
         self._next, self._ready_us = controls, now_us + solve_us
 
     def at_once(self, controls: PerRotor) -> None:
-        """Set a command that needs no solving; a decision that is being made is dropped."""
+        """Replace a decision that is being made by a command that needs no solving."""
         self._now, self._ready_us = controls, None
 
     def controls(self, now_us: int) -> PerRotor:
@@ -48,50 +40,37 @@ class SolveTime:
 
 
 class Actuation:
-    """Commands the rotors of one vehicle.
-
-    Attributes:
-        sent: The last command, parts of the largest speed.
-        decision: The present decision; None while the rotors stand or idle.
-        solve_time_s: Time of the last QP.
-        by_plain_law: Whether the plain law has replaced the control law.
-        descent: The last resort, once needed.
-    """
+    """Commands the rotors by the control law, or by the landing on three rotors once one is lost."""
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss) -> None:
-        """Command by the control law of `loop`, and by `rotor_loss` once a rotor is lost."""
         self._loop, self._rotor_loss = loop, rotor_loss
         self._stopped = loop.vehicle.rotors.stopped
         self.adopt(loop.vehicle)
-        self.by_plain_law = False
-        self.descent: Descent | None = None
+        self.by_plain_law = False  # the plain law has replaced the control law
+        self.descent: Descent | None = None  # the last resort, once needed
         self._solving = SolveTime(loop.control_interval_us, self._stopped)
-        self.sent = self._stopped
-        self.decision: Decision | None = None
-        self.solve_time_s = 0.0
+        self.sent = self._stopped  # parts of the largest speed
+        self.decision: Decision | None = None  # None while the rotors stand or idle
+        self.solve_time_s = 0.0  # of the last QP
 
     @property
     def missed(self) -> int:
-        """How many decisions took longer than a control interval."""
         return self._solving.missed
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Have a plain law for other numbers of the vehicle."""
         self.plain = PlainLaw(vehicle, self._loop.control_interval_us * 1e-6)
 
     def begin(self, controls: PerRotor) -> None:
-        """Begin with the rotors turning at `controls`."""
         self.sent = controls
         self._solving.at_once(controls)
         self._rotor_loss.begin(controls)
 
     def send(self, now_us: int) -> PerRotor:
-        """Return the command to send at `now_us`."""
         self.sent = self._solving.controls(now_us)
         return self.sent
 
     def turning(self, now_us: int, *, armed: bool) -> PerRotor:
-        """Return how the rotors turn at `now_us`, idling at the least while armed, parts of the largest speed."""
+        """Return the speeds of the rotors, at least idle while armed, in parts of the largest."""
         rotors = self._loop.vehicle.rotors
         minimum = rotors.idle_speed / rotors.max_speed if armed else 0.0
         controls = self._solving.controls(now_us)
@@ -100,20 +79,14 @@ class Actuation:
     def decide(
         self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float
     ) -> Decision | None:
-        """Decide at a control sample; return None while the rotors stand or idle, or an earlier sample is being solved.
-
-        `charge_ah` was taken from the battery; `solve_time_s` is the declared solve time of the control law.
-
-        Raises:
-            DecisionError: The decision is outside the limits of the rotors.
-        """
+        """Return the decision of a sample; None while the rotors stand or idle, or an earlier one is being solved."""
         decision = self._decide(now_us, state, guidance, charge_ah, solve_time_s)
         if decision is not None or not self._solving.busy(now_us):
             self.decision = decision
         return decision
 
     def decide_plainly(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        """Decide a control sample by the plain law, or by the descent, which needs no `guidance`."""
+        """Decide by the plain law, or by the descent, which needs no `guidance`."""
         if self.descent is not None:
             self.decision = self.descent.step(self.plain, now_us, state)
         elif guidance.horizon is not None:
@@ -151,10 +124,6 @@ class Actuation:
 
 
 def controls_of(decision: Decision, rotors: Rotors) -> PerRotor:
-    """Return the command of a decision of the plain law, parts of the largest speed.
-
-    Raises:
-        DecisionError: No rotor can follow it.
-    """
+    """Return the command of the plain law, parts of the largest speed; DecisionError if no rotor can follow it."""
     check_rotor_speeds("plain law", decision.rotor_speeds, rotors)
     return tuple((decision.rotor_speeds / rotors.max_speed).tolist())

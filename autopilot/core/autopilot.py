@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar, TypeVa
 from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
-from colibri.autopilot.core.defence.table import DELAY, STEP
+from colibri.autopilot.core.defence.table import DELAY, STEP, nothing
 from colibri.autopilot.core.step import Received, Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.guidance.guidance import Guidance
@@ -24,49 +24,37 @@ Ts = TypeVarTuple("Ts")
 
 
 class ControlSample(NamedTuple):
-    """A control sample.
+    """A control sample."""
 
-    Attributes:
-        now_us: Time of its frame.
-        decision: None while the rotors stand or idle, or an earlier decision is being solved.
-    """
-
-    now_us: int
+    now_us: int  # of its frame
     state: VehicleState
     guidance: Guidance
-    decision: Decision | None
+    decision: Decision | None  # None while the rotors stand or idle, or an earlier decision is being solved
 
 
 class Stages(Protocol):
-    """The stages of a frame, which differ between a vehicle on a track and one with ground stations.
-
-    Attributes:
-        time_us: Time of the last frame with a known state; None if the next one begins a flight.
-    """
+    """The stages of a frame, which differ between a vehicle on a track and one with ground stations."""
 
     loop: ControlLoop
     delay: DelayCompensation
     state_source: StateSource
-    time_us: int | None
+    time_us: int | None  # of the last frame with a known state; None if the next one begins a flight
 
     @property
-    def mode(self) -> str:
-        """The flight mode."""
+    def mode(self) -> str: ...
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
         """Return the result of `call`; after an exception raise, or return the result of `otherwise`."""
 
-    def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
-        """Take in a frame and the plant status."""
+    def receive(self, frame: Frame, plant_status: PlantStatus) -> None: ...
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
 
-    def wait(self, now_us: int) -> None:
-        """Take in a frame without a known state."""
+    def wait(self, now_us: int) -> None: ...
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
-        """Take in a frame with a known state; `begins`: of a new flight."""
+        """Receive a frame with a known state; `begins`: of a new flight."""
 
     def ahead(self, known: StateFrame) -> StateFrame:
         """Predict the state at the time when a command sent now takes effect."""
@@ -74,51 +62,37 @@ class Stages(Protocol):
     def supervise(self, now_us: int, state: VehicleState) -> None:
         """Execute the failsafe that is due at a control sample."""
 
-    def guide(self, now_us: int, state: VehicleState) -> Guidance:
-        """Return the references of a control sample."""
+    def guide(self, now_us: int, state: VehicleState) -> Guidance: ...
 
-    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        """Return the decision of a control sample."""
+    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None: ...
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
         """Return a decision after an exception in the sample."""
 
-    def actuate(self, now_us: int) -> ActuatorCommand:
-        """Return the command to send."""
+    def actuate(self, now_us: int) -> ActuatorCommand: ...
 
-    def faults(self) -> tuple[Fault | WorldChange, ...]:
-        """Return the faults to request from the plant."""
+    def faults(self) -> tuple[Fault | WorldChange, ...]: ...
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None:
-        """Take in a completed control sample and its computation time."""
+        """Receive a completed control sample and its computation time."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
-        """Do work without a deadline: serve ground stations, and return the datagrams for them."""
+        """Do work without a deadline, and return the datagrams for ground stations."""
 
 
 StagesT = TypeVar("StagesT", bound=Stages)
 
 
 class Autopilot(Generic[StagesT]):
-    """Flies one vehicle: estimate, observe, supervise, guide, decide, actuate.
-
-    Attributes:
-        frame_interval_us: Requested interval of frames: the control interval or a fraction of it.
-    """
+    """Flies one vehicle: estimate, observe, supervise, guide, decide, actuate."""
 
     def __init__(self, stages: StagesT, clock: Clock) -> None:
         self.stages = stages
-        self.frame_interval_us = stages.loop.frame_interval_us
+        self.frame_interval_us = stages.loop.frame_interval_us  # the control interval or a fraction of it
         self._clock = clock
 
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
-        """Answer a frame.
-
-        A few frames may be lost; after a long gap, or a step back in time, a new flight begins.
-
-        Raises:
-            Exception: Of a stage without a guard.
-        """
+        """Answer a frame; after a long gap, or a step back in time, a new flight begins."""
         started_s = self._clock()
         stages, now_us = self.stages, frame.time_us
         stages.receive(frame, plant_status)
@@ -132,7 +106,7 @@ class Autopilot(Generic[StagesT]):
         flown: ControlSample | None = None
         decision = estimate = None
         if due:
-            flown = stages.guard(STEP, self._sample, _nothing, known, now_us)
+            flown = stages.guard(STEP, self._sample, nothing, known, now_us)
             decision = stages.rescue(known, now_us) if flown is None else flown.decision
             estimate = stages.state_source.estimate
         command = stages.actuate(now_us)
@@ -148,7 +122,6 @@ class Autopilot(Generic[StagesT]):
         return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
 
     def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
-        """Do work without a deadline, while the plant integrates; return the datagrams for ground stations."""
         return self.stages.serve(inbox)
 
     def _sample(self, known: StateFrame, now_us: int) -> ControlSample:
@@ -164,6 +137,3 @@ class Autopilot(Generic[StagesT]):
         if stages.delay.delay_us == 0:
             return state
         return stages.guard(DELAY, lambda: stages.loop.observe(stages.ahead(known)), lambda: state)
-
-
-def _nothing() -> None: ...

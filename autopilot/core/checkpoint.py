@@ -1,8 +1,7 @@
 """The checkpoint of a flight: plain data to continue it after the autopilot was killed.
 
-It is recorded at each control sample, and belongs to the flight whose next frame follows it in time. Within `CLOSE_US`
-references, the control law's memory and the estimator are restored; later only mode and task, from the present place.
-Open transactions of ground stations are not recorded.
+It belongs to the flight whose next frame follows it in time. Within `CLOSE_US`, references, the law's memory and the
+estimator are restored; later only mode and task, from the present place.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,79 +25,52 @@ from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.mission.items import MissionItem
 from colibri.plant.vehicle.description import Vehicle
 
-CLOSE_US = 50_000
-"""A control law goes on over a gap as short as this: rotors and attitude are as it left them."""
-FOLLOWS_US = 30_000_000
-"""A frame that comes later is of another flight."""
-
-Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]
-"""Items by MAV_MISSION_TYPE."""
+CLOSE_US = 50_000  # a control law goes on over so short a gap: rotors and attitude are as it left them
+FOLLOWS_US = 30_000_000  # a frame that comes later is of another flight
+Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE
 
 
 class Checkpoint(NamedTuple):
-    """A flight at one control sample.
+    """A flight at one control sample."""
 
-    Attributes:
-        fingerprint: Hash of profile and vehicle; the memory of another law is not restored.
-        origin: Origin of the ENU frame.
-        plan_ids: Opaque ids of mission, geofence and rally points, which are stored separately.
-        charge_ah: Charge taken from the battery.
-        state_source: State of the estimator; empty on state feedback.
-        rotor_lost: Index; None if all rotors turn.
-        rotor_speeds: Modelled speeds, parts of the largest, (4,).
-        had_station: Whether a ground station was ever connected; the link-loss timer starts at the restart.
-    """
-
-    fingerprint: int
+    fingerprint: int  # the memory of another law is not restored
     time_us: int
-    origin: Geodetic
-    plan_ids: tuple[int, ...]
+    origin: Geodetic  # of the ENU frame
+    plan_ids: tuple[int, ...]  # of mission, geofence and rally points, which are stored separately
     mission: MissionRecord
     pilot: PilotRecord
     task: TaskRecord
     loop: LoopRecord
-    charge_ah: float
+    charge_ah: float  # taken from the battery
     energy_wh: float
-    state_source: bytes
-    rotor_lost: int | None
-    rotor_speeds: Array
+    state_source: bytes  # of the estimator; empty on state feedback
+    rotor_lost: int | None  # index; None if all rotors turn
+    rotor_speeds: Array  # modelled, parts of the largest, (4,)
     failsafes: FailsafeMemory
-    had_station: bool
+    had_station: bool  # the link-loss timer starts at the restart
 
     def is_followed_by(self, time_us: int) -> bool:
-        """Whether a frame can be of the same flight."""
         return 0 <= time_us - self.time_us <= FOLLOWS_US
 
     def is_close_to(self, time_us: int) -> bool:
-        """Whether a frame follows so closely that everything goes on."""
         return 0 <= time_us - self.time_us <= CLOSE_US
 
 
 class History(NamedTuple):
-    """A recorded flight: its last control sample, and the plans uploaded by ground stations."""
+    """A recorded flight, and the plans uploaded by ground stations."""
 
     checkpoint: Checkpoint
     plans: Plans
 
 
 def fingerprint_of(profile: Profile, vehicle: Vehicle) -> int:
-    """Return a number that differs between profiles and vehicles that do."""
     return crc32(msgspec.msgpack.encode(profile) + repr(vehicle).encode())
 
 
-def goes_on(mode: Mode, seq: int) -> str:
-    """Return the status text of a flight that goes on."""
-    what = f"mission continues at item {seq}" if mode is Mode.MISSION else f"{mode} continues"
-    return f"Restarted in flight: {what}"
-
-
 Again: TypeAlias = Callable[[TaskRecord, Mode, TaskContext], FlightTask]
-"""Returns the task with which a mode goes on."""
 
 
 class Checkpointer:
-    """Records and restores one vehicle's flight."""
-
     def __init__(self, fingerprint: int, parts: Parts) -> None:
         self._fingerprint = fingerprint
         self._parts = parts

@@ -28,8 +28,7 @@ from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
 
-_SETTLES_WITHIN_US = 100_000
-"""Parameters are settled this often even if messages use up the budget."""
+_SETTLES_WITHIN_US = 100_000  # parameters are settled this often even if messages use up the budget
 
 T = TypeVar("T")
 
@@ -49,22 +48,15 @@ def copter_autopilot(
     """Return an autopilot that flies `vehicle` by `profile` as ground stations command.
 
     Args:
-        profile: The control law and its numbers.
-        vehicle: The vehicle that the law assumes.
-        settings: Towards ground stations.
         clock: Seconds; it only measures.
         values: Of parameters that were changed before.
-        first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
-            up in hold.
-        estimator: Makes the estimator; None: the one for the settings' feedback.
+        first: A track flown from time 0 on, in the air; without it the vehicle stands, or is picked up in hold.
+        estimator: By default the one for the settings' feedback.
         history: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
-        strict: Whether what a part of it raises in flight is raised, rather than replaced.
+        strict: Whether exceptions in flight are raised.
 
     Raises:
-        ControllerError: The profile's control law cannot be used.
-        ProfileError: Its table is wrong.
-        SolverError: Its solver cannot be used.
-        ImpossibleError: The values of the parameters make an impossible vehicle.
+        AutopilotError: The profile cannot be used, or the parameters make an impossible vehicle.
         VehicleError: The feedback is of sensors that the vehicle has not.
     """
     estimator = estimator or estimator_for(settings.feedback, vehicle, settings.origin)
@@ -75,12 +67,7 @@ def copter_autopilot(
 
 
 class Copter:
-    """Flies a vehicle by its pilot, under supervision, and serves ground stations.
-
-    Attributes:
-        guard: Catches exceptions of the parts.
-        time_us: Time of the last frame with a known state; None before the first.
-    """
+    """Flies a vehicle by its pilot, under supervision, and serves ground stations."""
 
     def __init__(
         self, parts: Parts, checkpointer: Checkpointer, history: History | None, start_speed: float, gravity_m_s2: float
@@ -98,7 +85,7 @@ class Copter:
         self._reporter = Reporter(parts)
         self._sampled: tuple[ControlSample, Decision | None, float] | None = None
         self._plant_status = NOTHING
-        self.time_us: int | None = None
+        self.time_us: int | None = None  # of the last frame with a known state
         self._waiting_us: int | None = None
         self._settles_by_us = 0
 
@@ -108,23 +95,21 @@ class Copter:
 
     @property
     def samples(self) -> int:
-        """How many control samples were reported to ground stations."""
         return self._reporter.samples
 
     @property
     def resumed(self) -> str:
-        """Text on the continued flight after a restart; empty without one."""
         return self._start.resumed
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
         self._plant_status, self.defence.frame = plant_status, frame
         battery = plant_status.battery
         if battery is not None:
-            self.guard(table.BATTERY, self._know_charge, _nothing, battery)
+            self.guard(table.BATTERY, self._know_charge, table.nothing, battery)
         if plant_status.delay_us is not None:
             self.delay.measure(plant_status.delay_us)
         if self._start.wakes:
-            self.guard(table.RESTART, self._start.wake, _nothing, frame.time_us)
+            self.guard(table.RESTART, self._start.wake, table.nothing, frame.time_us)
 
     def _know_charge(self, battery: PlantBattery) -> None:
         if battery.exists:
@@ -183,17 +168,16 @@ class Copter:
             return self._refuse(inbox)
         self._report()
         plant_status, self._plant_status = self._plant_status, NOTHING
-        self.guard(table.STATIONS, self.stations.receive_status, _nothing, plant_status, now_us)
+        self.guard(table.STATIONS, self.stations.receive_status, table.nothing, plant_status, now_us)
         self._receive_from_stations(inbox, now_us)
         if self.parameters.proposed and (self.parts.budget.allows(now_us) or now_us >= self._settles_by_us):
             self._settles_by_us = now_us + _SETTLES_WITHIN_US
-            self.guard(table.PARAMETERS, self.parameters.settle, _nothing)
+            self.guard(table.PARAMETERS, self.parameters.settle, table.nothing)
         if self.parameters.revision != self.parts.subscribers.revision:
             self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
         return self.stations.poll(now_us)
 
     def record(self) -> Checkpoint | None:
-        """Return the checkpoint for a restart; None before the first estimate, or after an exception."""
         now_us = self.time_us
         if now_us is None:
             return None
@@ -203,18 +187,17 @@ class Copter:
         self.parts.subscribers.keep(self.parameters)
 
     def _report(self) -> None:
-        """Report a control sample; where that raises, ground stations read the mode, and old values beside it."""
         sampled, self._sampled = self._sampled, None
         if sampled is not None:
             self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, *sampled)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
         if self.stations.hub.waiting:
-            self.guard(table.DATAGRAM, self.stations.hub.work, _nothing, now_us)
+            self.guard(table.DATAGRAM, self.stations.hub.work, table.nothing, now_us)
         if not inbox:
             return
         arriving = iter(inbox)
-        while self.guard(table.DATAGRAM, self._receive_one, _true, arriving, now_us):
+        while self.guard(table.DATAGRAM, self._receive_one, lambda: True, arriving, now_us):
             pass
 
     def _receive_one(self, arriving: Iterator[Received], now_us: int) -> bool:
@@ -232,10 +215,3 @@ class Copter:
         self._receive_from_stations(inbox, self._waiting_us)
         self.stations.refuse_commands("")
         return self.stations.take_outbox()
-
-
-def _true() -> bool:
-    return True
-
-
-def _nothing() -> None: ...

@@ -1,7 +1,7 @@
 """The start of a flight: on the ground, in mid-flight, after missed frames, or after a restart of the autopilot."""
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.core.checkpoint import Checkpointer, History, goes_on
+from colibri.autopilot.core.checkpoint import Checkpointer, History
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.core.supervision import Supervision
 from colibri.mavlink.hil.state import StateFrame
@@ -11,36 +11,29 @@ FALLS = "Restarted in flight without a record: falling"
 
 
 class FlightStart:
-    """Starts the flights of one vehicle.
-
-    Attributes:
-        resumed: Text on the continued flight after a restart; empty without one.
-        wakes: Whether to resume the estimator before the next frame.
-    """
+    """Starts the flights of one vehicle, from `history` after a restart; at time 0 rotors turn at `start_speed`."""
 
     def __init__(
         self,
         parts: Parts,
         supervision: Supervision,
-        checkpointer: Checkpointer,
+        recorder: Checkpointer,
         history: History | None,
         start_speed: float,
     ) -> None:
-        """Start a vehicle of these parts, from `history` if there is one; at time 0 rotors turn at `start_speed`."""
-        self._parts, self._supervision, self._checkpointer = parts, supervision, checkpointer
+        self._parts, self._supervision, self._checkpointer = parts, supervision, recorder
         self._history = history
-        self.wakes = history is not None
+        self.wakes = history is not None  # whether to resume the estimator before the next frame
         self._start_speed = start_speed
-        self.resumed = ""
+        self.resumed = ""  # text on the continued flight after a restart
 
     def wake(self, time_us: int) -> None:
-        """Resume the estimator before it takes in the first frame."""
         self.wakes = False
         if self._history is not None and self._history.checkpoint.state_source:
             self._parts.state_source.resume(self._history.checkpoint.state_source, time_us)
 
     def begin(self, frame: StateFrame, before_us: int | None) -> None:
-        """Start at a frame that does not follow the last one, of `before_us` (None: the first)."""
+        """Start at a frame that does not follow the last one, of `before_us`."""
         self._supervision.miss(before_us)
         history, self._history = self._history, None
         if history is not None and history.checkpoint.is_followed_by(frame.time_us):
@@ -64,7 +57,9 @@ class FlightStart:
         if not pilot.state.armed:
             return
         self._catch(frame.time_us)
-        self.resumed = goes_on(pilot.state.mode, parts.stations.missions.progress().seq)
+        mode, seq = pilot.state.mode, parts.stations.missions.progress().seq
+        what = f"mission continues at item {seq}" if mode is Mode.MISSION else f"{mode} continues"
+        self.resumed = f"Restarted in flight: {what}"
         parts.lines.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame, *, again: bool) -> None:

@@ -20,19 +20,18 @@ class Flying:
 
     @property
     def armed(self) -> bool:
-        """Whether the rotors may turn."""
         descent = self._parts.actuation.descent
         return self._parts.pilot.state.armed and not (descent is not None and descent.landed)
 
     def go_blind(self) -> None:
-        """Descend: the estimator has failed, and the position is unknown."""
+        """Descend without an estimator: the position is unknown."""
         if not self._blind:
             self._blind = True
             self._parts.defence.off.add(table.ROTOR_WATCH)
             self._parts.pilot.save(Action.DESCEND)
 
     def rescue(self, now_us: int, known: StateFrame) -> Decision | None:
-        """Fly the last resort where a sample itself has raised."""
+        """Fly the last resort after an exception in the sample itself."""
         self.descend(now_us)
         euler = euler_from_quaternion(known.attitude)
         state = VehicleState(known.position_enu_m, known.velocity_enu_m_s, known.attitude, euler, known.rate_flu_rad_s)
@@ -40,14 +39,14 @@ class Flying:
         return self._guard(table.PLAIN_LAW, lambda: actuation.decide_plainly(now_us, state, RESTS), lambda: None)
 
     def descend(self, now_us: int) -> None:
-        """Fly the last resort from now on, for good."""
+        """Fly the last resort for good."""
         pilot, actuation = self._parts.pilot, self._parts.actuation
         if actuation.descent is None:
             actuation.descent = Descent(now_us, pilot.ground.height_m, standing=pilot.ground.standing)
             pilot.readiness.descends = True
 
     def guide(self, now_us: int) -> Guidance:
-        """Return the pilot's references; where the task raises, those of hold, and where that does, none."""
+        """Return the pilot's references; after an exception in the task those of hold, then none."""
         pilot, self._now_us = self._parts.pilot, now_us
         if self._parts.actuation.descent is not None:
             return RESTS
@@ -70,7 +69,6 @@ class Flying:
         return RESTS
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        """Return the decision of the control law, or of what flies in its place."""
         parts = self._parts
         if parts.actuation.descent is None and not parts.actuation.by_plain_law:
             decision = self._decide_by_law(now_us, state, guidance)

@@ -38,8 +38,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Parts of one vehicle: as many attributes as it has parts, each described by its class."""
-
     parameters: Parameters
     subscribers: Subscribers
     loop: ControlLoop
@@ -126,21 +124,8 @@ def parts_of(
         subscribers.fly(tuning.built(parameters.values))
 
     rotor_loss.rebuild = rebuild
+    state_source = StateSource(estimator, loop.frame_interval_us)
     return Parts(
-        parameters,
-        subscribers,
-        loop,
-        delay,
-        StateSource(estimator, loop.frame_interval_us),
-        actuation,
-        rotor_loss,
-        battery,
-        tasks,
-        pilot,
-        supervisor,
-        stations,
-        snapshots,
-        lines,
-        defence,
-        budget,
+        *(parameters, subscribers, loop, delay, state_source, actuation, rotor_loss, battery),
+        *(tasks, pilot, supervisor, stations, snapshots, lines, defence, budget),
     )

@@ -14,20 +14,15 @@ _CRITICAL = (mav.MAV_BATTERY_CHARGE_STATE_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE
 
 
 class Reporter:
-    """Reports the control samples of one vehicle.
-
-    Attributes:
-        samples: How many were reported.
-    """
+    """Reports the control samples of one vehicle."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
         self._health = HealthWatch()
         self._interval_s = parts.loop.control_interval_us * 1e-6
-        self.samples = 0
+        self.samples = 0  # reported
 
     def report(self, sample: ControlSample, decision: Decision | None, duration_s: float) -> None:
-        """Report a control sample, with the decision that is flown."""
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
         now_us, state, guidance, _ = sample
         self.samples += 1
@@ -66,7 +61,7 @@ class Reporter:
         )
 
     def _battery_fault(self, charge_state: int) -> str:
-        """Return the reason against a take-off on the battery, apart from its charge; empty without one."""
+        """Return the reason against a take-off on the battery, apart from its charge."""
         voltage_v, model = self._parts.battery.voltage_v, self._parts.battery.battery
         if model is None:
             return ""

@@ -12,20 +12,17 @@ from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ROTORS, ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
 
-MISSED_US = 100_000
-"""How long frames may be missing while the model of the rotors still holds, more or less."""
+MISSED_US = 100_000  # frames may be missing so long: the model of the rotors still holds, more or less
 
 
 def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
-    """Whether a frame goes on from the one before, where they come every `interval_us`."""
     return before_us is not None and 0 < time_us - before_us <= max(interval_us, MISSED_US)
 
 
 class Step(NamedTuple):
-    """Answer to a frame.
+    """Answer to a frame: between control samples the last command, without a decision.
 
-    Between control samples there is no decision, and the last command is repeated. Unless the vehicle is `known`, its
-    rotors stand. Without ground stations, a decision comes with its frame and references.
+    Unless the vehicle is `known`, its rotors stand. Without ground stations, a decision has its frame and references.
     """
 
     command: ActuatorCommand
@@ -40,24 +37,17 @@ class Step(NamedTuple):
 
 
 def nothing_known(time_us: int, duration_s: float) -> Step:
-    """Return the answer to a frame before the first estimate."""
     return Step(ActuatorCommand(time_us, (0.0,) * ROTORS, armed=False), None, duration_s, known=False)
 
 
 class Steps(Protocol):
     """An autopilot."""
 
-    def step(self, frame: Frame, plant_status: PlantStatus) -> Step:
-        """Answer a frame and the plant status beside it."""
-        ...
+    def step(self, frame: Frame, plant_status: PlantStatus) -> Step: ...
 
 
 def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_s: float) -> Step | None:
-    """Answer a plant's datagram; return None if it contains no frame.
-
-    Raises:
-        DecisionError: The decision is outside the limits of the rotors.
-    """
+    """Answer a plant's datagram; None if it contains no frame, DecisionError beyond the limits of the rotors."""
     received = end.receive(datagram, now_s)
     if received is None:
         return None
@@ -67,7 +57,7 @@ def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_
 
 
 class Received(NamedTuple):
-    """A datagram of a ground station: on which link, from which address, and whether it may set up signing."""
+    """A datagram of a ground station, and whether it may set up signing (`owner`)."""
 
     datagram: bytes
     link: int

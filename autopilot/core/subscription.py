@@ -14,23 +14,14 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class FlownSettings(NamedTuple):
-    """The active settings.
-
-    Attributes:
-        values: Values of all parameters.
-        tuned: Control law and vehicle.
-    """
+    """The active parameters, control law and vehicle."""
 
     values: Mapping[str, Value]
     tuned: Tuned
 
 
 class Subscribers:
-    """Callbacks that adopt a change of parameters.
-
-    Attributes:
-        revision: Revision of the adopted parameters.
-    """
+    """Callbacks that adopt a change of parameters; control law and vehicle only if one of their numbers has changed."""
 
     def __init__(
         self,
@@ -39,43 +30,29 @@ class Subscribers:
         behaviour: tuple[Callable[[Behaviour], None], ...],
         law: tuple[Callable[[Controller[Any], Vehicle], None], ...],
         vehicle: tuple[Callable[[Vehicle], None], ...],
-        flown: FlownSettings | None = None,
+        flown: FlownSettings,
     ) -> None:
-        """Call these back.
-
-        Args:
-            parameters: Take all parameters.
-            behaviour: Take the numbers of the behaviour.
-            law: Take the control law and its vehicle; called only if one of their numbers has changed.
-            vehicle: Take the vehicle; likewise.
-            flown: What is flown by now, for `keep`.
-        """
         self._parameters, self._behaviour, self._law, self._vehicle = parameters, behaviour, law, vehicle
         self._flown = flown
-        self.revision = 0
+        self.revision = 0  # of the adopted parameters
 
     def adopt(self, parameters: Parameters) -> None:
-        """Call back with the changes since the last call, if there are any."""
         if parameters.revision == self.revision:
             return
         self.revision, made = parameters.revision, parameters.take_made()
         tuned = made if isinstance(made, Tuned) else None
         for call in self._calls(parameters, tuned):
             call()
-        if self._flown is not None:
-            self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
+        self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
 
     def fly(self, tuned: Tuned) -> None:
         """Adopt another control law and vehicle with the same parameters."""
         for call in self._calls_of(tuned):
             call()
-        if self._flown is not None:
-            self._flown = self._flown._replace(tuned=tuned)
+        self._flown = self._flown._replace(tuned=tuned)
 
     def keep(self, parameters: Parameters) -> None:
         """Return to the settings before a change that a subscriber refused."""
-        if self._flown is None:
-            return
         parameters.load(self._flown.values)
         parameters.take_made()
         self.revision = parameters.revision

@@ -25,7 +25,7 @@ class Supervision:
         self._caught_us: int | None = None
 
     def listen(self, now_us: int) -> None:
-        """Count the loss of clients from `now_us` on: the restart."""
+        """Count the loss of clients from a restart on."""
         self._listening_us = now_us
 
     def catch(self, now_us: int) -> None:
@@ -33,20 +33,19 @@ class Supervision:
         self._caught_us = now_us
 
     def miss(self, since_us: int | None) -> None:
-        """Note that frames were missed since `since_us`; None before the first frame."""
         if self._missed_us is None:
             self._missed_us = since_us
 
     def step(self, now_us: int, state: VehicleState) -> None:
-        """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
+        """Update the pilot's inputs, and have the pilot execute the failsafe that is due."""
         parts, guard = self._parts, self._guard
-        guard(table.ROTOR_WATCH, self._watch_rotors, _nothing, state)
+        guard(table.ROTOR_WATCH, self._watch_rotors, table.nothing, state)
         steered, position_known = guard(table.SETPOINTS, self._sensed, _not_steered, now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
         lift = parts.rotor_loss.watch.expected[0] / parts.loop.vehicle.gravity_m_s2 if self._doubts else None
         parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift))
-        guard(table.FAILSAFES, self._execute, _nothing, now_us, state)
+        guard(table.FAILSAFES, self._execute, table.nothing, now_us, state)
         if self._caught_us is not None:
             self._drift(now_us, self._caught_us, state)
         self._missed_us = None
@@ -111,9 +110,6 @@ class Supervision:
             needs_radio=stations.exempt is not None,
             exempt=_NOTHING if stations.exempt is None else stations.exempt(),
         )
-
-
-def _nothing() -> None: ...
 
 
 def _not_steered() -> tuple[ClientInputs, bool]:

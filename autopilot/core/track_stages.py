@@ -40,15 +40,10 @@ def track_autopilot(
 ) -> "Autopilot[TrackStages]":
     """Return an autopilot that flies `vehicle` along `track` from time 0 on.
 
-    Args:
-        clock: Seconds, for computation times.
-        estimator: Makes the estimator; None: state feedback.
-        law: Makes the control law; None: the registered one.
+    Without an `estimator` it flies on the state; without a `law`, by the registered one.
 
     Raises:
-        ControllerError: The profile's control law cannot be used.
-        ProfileError: Its table is invalid.
-        SolverError: Its solver cannot be used.
+        AutopilotError: The profile's control law, table or solver cannot be used.
     """
     loop = ControlLoop(profile, vehicle, clock, law)
     state_source = StateSource(estimator, loop.frame_interval_us)
@@ -59,13 +54,7 @@ def track_autopilot(
 
 
 class TrackStages:
-    """Flies a vehicle along a track.
-
-    On sensors the flight begins with the first estimate; until then the vehicle is not armed.
-
-    Attributes:
-        time_us: Time of the last frame with a known state; None after a frame without one.
-    """
+    """Flies a vehicle along a track; on sensors it is armed from the first estimate on."""
 
     mode = "track"
 

@@ -25,7 +25,7 @@ class TrialError(AutopilotError):
 
 
 class VehicleTrial:
-    """Tries the changes of one vehicle's parameters; the control law is tried by `Tuning` itself."""
+    """Tries changes of the parameters; the control law is tried by `Tuning` itself."""
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss, planned_at: Instants) -> None:
         self._loop, self._rotor_loss, self._planned_at = loop, rotor_loss, planned_at
@@ -35,11 +35,7 @@ class VehicleTrial:
         return self._rotor_loss.has_designed(vehicle)
 
     def try_vehicle(self, vehicle: Vehicle) -> None:
-        """Build all that is built from a vehicle's numbers, and try each part in hover.
-
-        Raises:
-            AutopilotError: A part cannot be built, or flown.
-        """
+        """Build every part from a vehicle, and try it in hover; AutopilotError if that is impossible."""
         loop, interval_s = self._loop, self._loop.control_interval_us * 1e-6
         self._rotor_loss.try_out(vehicle)
         controls_of(PlainLaw(vehicle, interval_s).by_velocity(AT_REST, np.zeros(3)), vehicle.rotors)
@@ -50,11 +46,7 @@ class VehicleTrial:
                 raise TrialError("the vehicle's thrust and weight are not finite")
 
     def try_values(self, parameters: Parameters) -> None:
-        """Build behaviour, limits and failsafes from the parameters, and lead a reference by them for a sample.
-
-        Raises:
-            TrialError: The reference is not finite.
-        """
+        """Build behaviour, limits and failsafes, and lead a reference by them; TrialError if it is not finite."""
         settings(parameters)
         flies_by = behaviour(parameters)
         preview = self._planned_at.preview

@@ -1,35 +1,24 @@
-"""The last resort: brake, descend, and stop the rotors on the ground.
-
-It depends on the state and the plain law alone: not on task, reference or the landing detector.
-"""
+"""The last resort: brake, descend, stop the rotors on the ground, by the state and the plain law alone."""
 
 import numpy as np
 
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.core.defence.plain_law import PlainLaw
 
-_SINK_1_S, _LEAST_M_S, _MOST_M_S = 0.5, 0.7, 2.0
-"""As fast as the height allows: metres a second for each metre."""
+_SINK_1_S, _LEAST_M_S, _MOST_M_S = 0.5, 0.7, 2.0  # as fast as the height allows
 _HELD_FOR_US = 700_000
-_SLOWER = 0.3
-"""Part of the sink asked for."""
+_SLOWER = 0.3  # part of the commanded sink rate
 
 
 class Descent:
-    """The descent of one vehicle.
-
-    Attributes:
-        landed: Whether the ground holds it.
-    """
+    """The descent to the ground at z = `ground_m`, ENU; a vehicle that is `standing` stays there."""
 
     def __init__(self, now_us: int, ground_m: float, *, standing: bool) -> None:
-        """Begin at `now_us`, the ground being at z = `ground_m` of ENU; a vehicle that is `standing` stays there."""
         self._ground_m = ground_m
         self._sinks_since_us = self._held_since_us = now_us
         self.landed = standing
 
     def step(self, law: PlainLaw, now_us: int, state: VehicleState) -> Decision | None:
-        """Decide a control sample; None after the landing."""
         sink_m_s = min(max(_SINK_1_S * (state.position_enu_m[2] - self._ground_m), _LEAST_M_S), _MOST_M_S)
         if now_us - self._sinks_since_us < _HELD_FOR_US or abs(state.velocity_enu_m_s[2]) > _SLOWER * sink_m_s:
             self._held_since_us = now_us

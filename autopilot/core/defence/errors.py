@@ -1,7 +1,4 @@
-"""The guard of a flight: catches, records, reports and counts exceptions.
-
-A part that raised is tried again next time; `table` has all parts, and which are switched off for good.
-"""
+"""The guard of a flight: catches, records, reports and counts exceptions."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -18,61 +15,42 @@ from colibri.mavlink.services.statustext import CRITICAL
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_MAX_RECORDS = 3
-"""Of one part: what raises in every frame would fill the disk."""
+_MAX_RECORDS = 3  # of one part: what raises in every frame would fill the disk
 _MAX_KEPT = 100
 
 
 class ErrorRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """A caught exception.
+    """A caught exception; frame and checkpoint by `to_bytes`."""
 
-    Attributes:
-        time_us: Simulated time of the frame.
-        instead: Replacement of the part.
-        error: The exception in one line.
-        frame: Frame of the plant, by `to_bytes`; empty without one.
-        checkpoint: Checkpoint of the flight, by `to_bytes`; empty if it cannot be recorded.
-    """
-
-    time_us: int
+    time_us: int  # simulated time of the frame
     part: str
-    instead: str
-    error: str
+    instead: str  # replacement of the part
+    error: str  # in one line
     traceback: str
     mode: str
     armed: bool
-    frame: bytes
-    checkpoint: bytes
+    frame: bytes  # empty without one
+    checkpoint: bytes  # empty if it cannot be recorded
 
 
 class Defence:
-    """Catches the exceptions of one vehicle.
-
-    Attributes:
-        frame: The present frame; None before the first.
-        counts: Exceptions by part.
-        off: Parts that are switched off.
-    """
+    """Catches the exceptions of one vehicle."""
 
     def __init__(self, pilot: Pilot, say: Callable[[int, str], None], *, strict: bool) -> None:
         self._pilot, self._say, self._strict = pilot, say, strict
         self._checkpoint: Callable[[], object] | None = None
         self._records: list[ErrorRecord] = []
         self._kept = 0
-        self.frame: Frame | None = None
-        self.counts: Counter[str] = Counter()
-        self.off: set[str] = set()
+        self.frame: Frame | None = None  # the present one
+        self.counts: Counter[str] = Counter()  # exceptions by part
+        self.off: set[str] = set()  # parts that are switched off
 
     def keep(self, checkpoint: Callable[[], object]) -> None:
         """Record `checkpoint` with each exception."""
         self._checkpoint = checkpoint
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return the result of `call`, or of `otherwise` after an exception or if the part is off.
-
-        Raises:
-            Exception: Of `call`, if strict.
-        """
+        """Return the result of `call`, or of `otherwise` if the part is off or raises, unless strict."""
         if part in self.off and PARTS[part].optional:
             return otherwise()
         try:
@@ -82,11 +60,7 @@ class Defence:
         return otherwise()
 
     def caught(self, part: str, error: Exception, instead: str = "") -> None:
-        """Record an exception of a part; `instead` overrides the name of its replacement.
-
-        Raises:
-            Exception: The same one, if strict.
-        """
+        """Record an exception, or raise it if strict; `instead` overrides the name of the replacement."""
         if self._strict:
             raise error
         self.counts[part] += 1

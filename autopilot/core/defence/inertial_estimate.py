@@ -1,8 +1,7 @@
 """The state after an exception in the estimator: gyroscope and accelerometer, with the barometer for height.
 
-A complementary filter (R. Mahony, T. Hamel, J.-M. Pflimlin, Nonlinear complementary filters on the special orthogonal
-group, IEEE TAC 53(5), 2008): the mean specific force of a level vehicle points up. Position is unknown; the horizontal
-velocity is integrated with a leak.
+A complementary filter: R. Mahony, T. Hamel, J.-M. Pflimlin, IEEE TAC 53(5), 2008. The mean specific force of a level
+vehicle points up. Position is unknown; the horizontal velocity is integrated with a leak.
 """
 
 from math import isfinite, sqrt
@@ -18,19 +17,14 @@ _UPRIGHT_1_S = 0.05
 _FORGET_1_S = 0.15
 _HEIGHT_1_S, _CLIMB_1_S2 = 2.0, 1.0
 _MAX_STEP_S = 0.1
-_STEADY = (0.7, 1.3)
-"""Parts of gravity: only so much of a specific force says where up is."""
+_STEADY = (0.7, 1.3)  # parts of gravity: the specific forces that show the vertical
 
 
 class InertialEstimate:
-    """The state of one vehicle, from the last estimate on.
-
-    Attributes:
-        frame: The state now.
-    """
+    """The state of one vehicle, from the last estimate on."""
 
     def __init__(self, estimate: Estimate, gravity_m_s2: float) -> None:
-        self.frame = estimate.frame
+        self.frame = estimate.frame  # the present state
         self._gravity = gravity_m_s2
         self._gyro_bias, self._accel_bias = estimate.gyro_bias_rad_s, estimate.accel_bias_m_s2
         self._rate = estimate.frame.rate_flu_rad_s
@@ -39,7 +33,6 @@ class InertialEstimate:
         self._above_m = 0.0
 
     def step(self, frame: SensorFrame) -> StateFrame:
-        """Take a frame, and return the state at its time."""
         before = self.frame
         interval_s = min(max((frame.time_us - before.time_us) * 1e-6, 0.0), _MAX_STEP_S)
         self._rate = _read(frame, Updated.GYROSCOPE, frame.rate_flu_rad_s, self._gyro_bias) or self._rate
@@ -83,7 +76,7 @@ class InertialEstimate:
 
 
 def turned(attitude: Quaternion, rate: Vector, interval_s: float) -> Quaternion:
-    """Return an attitude after a turn at body rates, rad/s, to the second order of so short a time."""
+    """Return an attitude after a short turn at body rates, rad/s, to the second order."""
     w, x, y, z = attitude
     p, q, r = (0.5 * interval_s * each for each in rate)
     return normalized(
@@ -92,7 +85,6 @@ def turned(attitude: Quaternion, rate: Vector, interval_s: float) -> Quaternion:
 
 
 def _read(frame: SensorFrame, group: int, value: Vector, bias: Vector) -> Vector | None:
-    """Return a measurement without its bias; None without one."""
     if not frame.has(group) or not all(map(isfinite, value)):
         return None
     x, y, z = value

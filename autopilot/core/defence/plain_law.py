@@ -32,7 +32,7 @@ _NOWHERE = np.zeros(3)
 
 
 class PlainLaw:
-    """The plain law of one vehicle; it remembers the acceleration that has held the velocity up to now."""
+    """The plain law of one vehicle, with the integral of its velocity error."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         self._interval_s = interval_s
@@ -48,14 +48,14 @@ class PlainLaw:
         self._integral = _NOWHERE
 
     def step(self, state: VehicleState, references: Horizon) -> Decision:
-        """Decide the rotor speeds to hold until the next control sample by the first of the references."""
+        """Decide the rotor speeds by the first of the references."""
         place = references.position_enu_m[0] - np.array(state.position_enu_m)
         towards = _shortened(_PLACE_1_S * place, _APPROACH_M_S)
         velocity = references.velocity_enu_m_s[0] + towards
         return self.by_velocity(state, velocity, references.acceleration_enu_m_s2[0])
 
     def by_velocity(self, state: VehicleState, velocity: Array, acceleration: Array = _NOWHERE) -> Decision:
-        """Decide the same for a velocity, m/s, ENU, (3,), and an acceleration, m/s², beside it."""
+        """Decide by a velocity, m/s, ENU, (3,), and an acceleration, m/s²."""
         error = velocity - np.array(state.velocity_enu_m_s)
         flat = self._gravity * tan(_MAX_TILT_RAD)
         wanted = _limited(_VELOCITY_1_S * error + self._integral + acceleration, flat)
@@ -65,7 +65,6 @@ class PlainLaw:
         return self._decide(state, wanted, self._mass_kg * norm(wanted))
 
     def step_attitude(self, state: VehicleState, demand: AttitudeDemand) -> Decision:
-        """Decide the same for an attitude and a thrust."""
         phi, theta, psi = demand.angles[0].tolist()
         up = np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi)))[:, 2].copy()
         return self._decide(state, up, float(demand.thrust_n[0]))
@@ -86,7 +85,6 @@ def _shortened(vector: Array, longest: float) -> Array:
 
 
 def _limited(acceleration: Array, flat: float) -> Array:
-    """Return an acceleration, (3,), within a horizontal and the vertical limit."""
     limited = acceleration.copy()
     length = hypot(limited[0], limited[1])
     if length > flat:

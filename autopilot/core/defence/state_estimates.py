@@ -7,25 +7,19 @@ from colibri.autopilot.estimation.state_source import StateSource
 from colibri.mavlink.hil.sensors import Frame, SensorFrame
 from colibri.mavlink.hil.state import StateFrame
 
-_BRIDGED = 5
-"""So many frames in a row are carried on as if nothing were; after more of them nobody knows the place."""
-_MAX_ERRORS = 50
-"""An estimator that has raised so often is not asked again."""
+_BRIDGED = 5  # frames in a row after which the position counts as unknown
+_MAX_ERRORS = 50  # exceptions after which the estimator is not asked again
 _UNKNOWN_M = 1e3
 
 
 class StateEstimates:
-    """The states of one vehicle.
-
-    Attributes:
-        blind: Whether the state comes from the inertial sensors alone, without position.
-    """
+    """The states of one vehicle."""
 
     def __init__(self, source: StateSource, defence: Defence, gravity_m_s2: float) -> None:
         self._source, self._defence, self._gravity = source, defence, gravity_m_s2
         self._inertial: InertialEstimate | None = None
         self._missed = 0
-        self.blind = False
+        self.blind = False  # the state comes from the inertial sensors alone, without position
 
     def state(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""

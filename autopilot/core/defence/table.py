@@ -4,21 +4,14 @@ from typing import Final, NamedTuple
 
 
 class DefendedPart(NamedTuple):
-    """A part.
-
-    Attributes:
-        name: Name in reports.
-        instead: Replacement, as reported.
-        optional: Whether it is switched off after `TRIES` exceptions; others are tried again each time.
-    """
+    """A part, and its replacement as reported."""
 
     name: str
     instead: str
-    optional: bool = False
+    optional: bool = False  # off after `TRIES` exceptions; others are tried again each time
 
 
 TRIES = 3
-"""A part that raises so often is off."""
 
 BATTERY: Final = "battery monitor"
 RESTART: Final = "restart"
@@ -77,3 +70,6 @@ PARTS: Final = {
     )
 }
 """All of them; services of the hub are parts under names of their own."""
+
+
+def nothing() -> None: ...

@@ -106,6 +106,9 @@ def test_subscribers_receive_each_change_once(flight: Flight) -> None:
         behaviour=(lambda flies_by: handed.append(f"cruise {flies_by.limits.speed_m_s:g}"),),
         law=(lambda _, vehicle: handed.append(f"law for {vehicle.body.mass_kg:g} kg"),),
         vehicle=(lambda vehicle: handed.append(f"vehicle of {vehicle.body.mass_kg:g} kg"),),
+        flown=FlownSettings(
+            flight.parameters.values, Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law)
+        ),
     )
     subscribers.adopt(flight.parameters)
     assert handed == []
