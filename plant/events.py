@@ -1,6 +1,6 @@
 """Events of a flight, each at a time: what happens to the plant, and what ground stations send.
 
-As text `5:payload=0.2`; as a table `{t = 5, event = "payload", kg = 0.2}` of Python, or of `[[events]]` in a TOML file.
+As text `5:payload=0.2`; as a table `{t = 5, event = "payload", kg = 0.2}`, `[[events]]` in a TOML file.
 """
 
 from argparse import ArgumentTypeError
@@ -25,8 +25,7 @@ from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle
 
 EVENT = "T:KIND=VALUE|FILE.toml"
-_SAMPLED_S = 0.02
-"""Interval of samples of a wind that is a function."""
+_SAMPLED_S = 0.02  # interval of samples of a wind that is a function
 
 
 class Payload(TimedEvent, frozen=True, tag="payload"):
@@ -66,9 +65,8 @@ class Failure(TimedEvent, frozen=True, tag="failure"):
     @property
     def change(self) -> Fault:
         a, b, c, d = (*self.values, 0.0, 0.0, 0.0, 0.0)[:4]
-        values = (a, b, c, d)
         unit, kind = _number("FAILURE_UNIT", self.unit), _number("FAILURE_TYPE", self.type)
-        return Fault(unit, kind, self.instance, values)
+        return Fault(unit, kind, self.instance, (a, b, c, d))
 
 
 class Motor(TimedEvent, frozen=True, tag="motor"):
@@ -95,7 +93,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def event(text: str) -> Any:
-    """Read one event, or the events of a file."""
+    """Read an event, or the events of a file."""
     try:
         if text.endswith(".toml"):
             return tuple(map(event_of, read_toml(Path(text), _File, EventError).events))
@@ -113,7 +111,6 @@ def events_of(given: Iterable[Any], duration_s: float) -> tuple[Event, ...]:
 
 
 def event_of(given: Any, duration_s: float = 0.0) -> Event:
-    """Return an event of a struct, a mapping or a text."""
     if isinstance(given, str):
         return _of_text(given)
     if isinstance(given, TimedEvent):
@@ -136,7 +133,7 @@ def event_of(given: Any, duration_s: float = 0.0) -> Event:
 
 
 def check_events(events: Iterable[Event], vehicle: Vehicle, *, on_sensors: bool, served: bool = False) -> None:
-    """Refuse what this plant cannot do, and what ground stations send unless they are `served`: EventError."""
+    """Raise an EventError for what this plant cannot do, or ground stations must send unless they are `served`."""
     parts = {Equipment.ROTORS}
     parts |= {Equipment.BATTERY} if vehicle.battery is not None else set()
     parts |= {Equipment.SENSORS} if on_sensors else set()

@@ -19,7 +19,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 Part: TypeAlias = Literal["rotor-lag", "drag", "ground", "battery"]
 PARTS: tuple[Part, ...] = get_args(Part)
-"""What `Vehicle.without` can leave out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,12 +92,10 @@ class WorldSpec:
 
     @property
     def weather(self) -> Weather:
-        """Wind, gusts and turbulence."""
         return Weather(self.wind, self.gusts, self.turbulence, self.seed)
 
     @property
     def disturbance(self) -> Noise | None:
-        """The plant's noise, if any."""
         return Noise(self.noise, self.seed) if any(self.noise.values()) else None
 
     def started(self, usual: Start) -> Start:
@@ -147,5 +144,4 @@ class PlantSpec(WorldSpec, ProcessSpec):
 
     @property
     def pace(self) -> float:
-        """Speed, times real time."""
         return self.speed or (1.0 if self.realtime else inf)

@@ -1,7 +1,9 @@
 """The world's options as texts: wind, gusts, start."""
 
 from argparse import ArgumentTypeError
+from collections.abc import Collection
 from itertools import pairwise
+from math import inf, nan
 from pathlib import Path
 
 from colibri.common.errors import unknown
@@ -13,31 +15,25 @@ from colibri.plant.physics.start import Start
 
 
 def start_values(text: str) -> dict[str, float]:
-    return dict(_start_value(pair) for pair in text.split(","))
-
-
-def _start_value(pair: str) -> tuple[str, float]:
-    key, _, value = pair.partition("=")
-    if key not in Start._fields:
-        raise ArgumentTypeError(unknown("key", key, Start._fields))
-    try:
-        return key, number(value)
-    except ValueError:
-        raise ArgumentTypeError(f"{key}: must be a number, not {value or 'empty'}") from None
+    return _values(text, Start._fields, -inf, "a number")
 
 
 def noise_values(text: str) -> dict[str, float]:
+    return _values(text, NOISES, 0.0, "a number of at least 0")
+
+
+def _values(text: str, known: Collection[str], least: float, expected: str) -> dict[str, float]:
     values: dict[str, float] = {}
     for pair in text.split(","):
         key, _, value = pair.partition("=")
-        if key not in NOISES:
-            raise ArgumentTypeError(unknown("key", key, NOISES))
+        if key not in known:
+            raise ArgumentTypeError(unknown("key", key, known))
         try:
             values[key] = number(value)
         except ValueError:
-            values[key] = -1.0
-        if values[key] < 0.0:
-            raise ArgumentTypeError(f'{key}: must be a number of at least 0, not "{value}"')
+            values[key] = nan
+        if not values[key] >= least:
+            raise ArgumentTypeError(f"{key}: must be {expected}, not " + (f'"{value}"' if value else "empty"))
     return values
 
 

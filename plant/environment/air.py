@@ -10,17 +10,13 @@ CALM: Vector = (0.0, 0.0, 0.0)
 
 
 class Air:
-    """The air of one weather.
-
-    Attributes:
-        steady: Velocity, ENU, m/s, where it is constant; `None` where it changes.
-    """
+    """The air of one weather."""
 
     def __init__(self, weather: Weather) -> None:
         self._gusts = weather.gusts
         self._intensity = weather.turbulence
         self._turbulence = Turbulence(weather.seed)
-        self.steady: Vector | None = None
+        self.steady: Vector | None = None  # ENU, m/s, where it is constant
         self.blow(weather.wind)
 
     def blow(self, wind: Wind | RecordedWind) -> None:

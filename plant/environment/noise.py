@@ -9,8 +9,7 @@ from colibri.common.types import PerRotor, Vector
 from colibri.plant.environment.random_streams import RandomStream
 
 _ROTORS = 8  # the most of a vehicle
-NOISES = ("force", "moment", "motors")
-"""N, N m, and parts of each rotor's command, for each root of hertz."""
+NOISES = ("force", "moment", "motors")  # N, N m, and parts of each rotor's command, for each root of hertz
 
 
 class Disturbed(NamedTuple):

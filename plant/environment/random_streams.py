@@ -10,8 +10,6 @@ _BLOCK = 1024
 
 
 class RandomStream(IntEnum):
-    """Consumers of random numbers."""
-
     SENSORS = 0
     WEATHER = 1
     FAULTS = 2
@@ -22,12 +20,10 @@ class Chance:
     """Standard normal numbers of 24 bits: beyond, NumPy's tail depends on the computer's libm."""
 
     def __init__(self, seed: SeedSequence) -> None:
-        self._left: list[float] = []
-        """Drawn, the next one last."""
+        self._left: list[float] = []  # drawn, the next one last
         self.begin(seed)
 
     def begin(self, seed: SeedSequence) -> None:
-        """Begin again with another seed."""
         self._generator = default_rng(seed)
         self._left.clear()
 

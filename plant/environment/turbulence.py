@@ -6,8 +6,7 @@ Spectra, one-sided over angular frequency, with V the airspeed:
 - Φv and Φw(ω) = σ² (L / π V) (1 + 3 (L ω / V)²) / (1 + (L ω / V)²)²
 
 The filters have variance 1; height and airspeed set their decay rates and the σ that scales them. The discretisation is
-exact while these hold. Noise depends on seed and frame alone. Rotation of the air is left out: a quadrotor's span is
-small against the eddies.
+exact while these hold. Rotation of the air is left out: a quadrotor's span is small against the eddies.
 """
 
 from math import sqrt
@@ -21,13 +20,9 @@ from colibri.plant.environment.weather import Intensity
 
 FEET_PER_M = 1.0 / 0.3048
 KNOT_M_S = 1852.0 / 3600.0
-W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
-"""Wind at 20 feet, the measure of the turbulence."""
-MIN_HEIGHT_M = 10.0 / FEET_PER_M
-MAX_HEIGHT_M = 1000.0 / FEET_PER_M
-"""The formulas hold between these heights; outside, the nearer one is used."""
-MIN_AIRSPEED_M_S = 1.0
-"""A vehicle that hangs in calm air would otherwise stay in the same frozen eddy forever."""
+W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 45.0}  # wind at 20 feet
+MIN_HEIGHT_M, MAX_HEIGHT_M = 10.0 / FEET_PER_M, 1000.0 / FEET_PER_M  # the formulas hold between them
+MIN_AIRSPEED_M_S = 1.0  # in calm air a hovering vehicle would stay in the same frozen eddy forever
 
 _SQRT_3 = sqrt(3.0)
 _BLOCK = 256
@@ -44,7 +39,7 @@ class Eddies(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """Standard deviations and lengths at one height; `uv` is horizontal: σu = σv, Lu = Lv."""
+    """Standard deviations and lengths at one height; `uv` is horizontal."""
 
     sigma_uv_m_s: float
     sigma_w_m_s: float
@@ -65,8 +60,6 @@ def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
 
 
 class Turbulence:
-    """The turbulence of one seed."""
-
     def __init__(self, seed: int) -> None:
         self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.WEATHER,)).generate_state(2, np.uint64)
         self._block: tuple[int, list[list[float]]] = (-1, [])
@@ -93,8 +86,7 @@ class Turbulence:
 def _twice(x: tuple[float, float], way: float, n1: float, n2: float) -> tuple[float, float]:
     """Advance two equal lags in series, x1' = a (n - x1) and x2' = a (x1 - x2), by a t = `way`.
 
-    With P = [[1, 1/2], [1/2, 1/2]] stationary, the noise has the covariance P - Φ P Φᵀ, Φ = exp(-way) [[1, 0], [way,
-    1]].
+    The noise has the covariance P - Φ P Φᵀ, with P = [[1, 1/2], [1/2, 1/2]] and Φ = exp(-way) [[1, 0], [way, 1]].
     """
     fade = exp(-way)
     squared = fade * fade

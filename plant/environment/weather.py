@@ -12,8 +12,7 @@ from colibri.common.types import Vector
 Intensity: TypeAlias = Literal["light", "moderate", "severe"]
 
 INTENSITIES: tuple[Intensity, ...] = ("light", "moderate", "severe")
-MAX_SPEED_M_S = 150.0
-"""Above any wind recorded on the ground."""
+MAX_SPEED_M_S = 150.0  # above any wind recorded on the ground
 
 
 class Wind(NamedTuple):

@@ -8,10 +8,8 @@ import numpy as np
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
-_MAX_RATE_RAD_S = 2500.0
-"""Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
-_ROUNDED = 0.994
-"""A value in three digits that is this part of another is not above it."""
+_MAX_RATE_RAD_S = 2500.0  # Runge-Kutta 4 in steps of 1 ms is stable up to 2785
+_ROUNDED = 0.994  # a value in three digits that is this part of another is not above it
 _BISECTIONS = 40
 
 
@@ -23,7 +21,7 @@ class _Hardness(NamedTuple):
 
 @lru_cache(maxsize=4)
 def check_contact(vehicle: Vehicle) -> None:
-    """Raise a `VehicleError` with the largest valid values if the ground is too hard for the plant's step."""
+    """Raise a VehicleError with the largest valid values if the ground is too hard for the plant's step."""
     ground = vehicle.ground
     if ground is None:
         return

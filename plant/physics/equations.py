@@ -4,7 +4,7 @@ x has 14 + N values: the rigid body's `STATE`, N rotor speeds in the vehicle's u
 m/s and rates rad/s are FLU, position m is ENU; the unit quaternion turns FLU into ENU.
 
 Rotors that all thrust along z in the plane of the centre of mass, on a body with a diagonal inertia matrix, have
-shorter equations. Which ones, and the number of rotors, are known at compile time, from the shapes of the parameters.
+shorter equations, chosen at compile time by the shapes of the parameters.
 """
 
 from collections.abc import Sequence
@@ -89,10 +89,8 @@ def _wrench_in_space(speeds: Array | PerRotor, parameters: PlantParameters) -> W
     fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(parameters.thrust)):
         x, y, z = parameters.rotor_x_m[i], parameters.rotor_y_m[i], parameters.axes[i, 3]
-        thrust_n, drag_n_m = (
-            parameters.thrust[i] * speeds[i] * speeds[i],
-            parameters.yaw_moment[i] * speeds[i] * speeds[i],
-        )
+        thrust_n = parameters.thrust[i] * speeds[i] * speeds[i]
+        drag_n_m = parameters.yaw_moment[i] * speeds[i] * speeds[i]
         ax, ay, az = parameters.axes[i, 0], parameters.axes[i, 1], parameters.axes[i, 2]
         fx, fy, fz = fx + thrust_n * ax, fy + thrust_n * ay, fz + thrust_n * az
         mx += thrust_n * (y * az - z * ay) + drag_n_m * ax
@@ -141,7 +139,7 @@ def _turn_in_space(rate: Vector, moment: Vector, h: Vector, h_rate: Vector, iner
 def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, inertia: Vector) -> Vector:
     """Return (p', q', r') by Euler's equation with rotors, THESIS [2.8].
 
-    I ω' + (0, 0, h') = -ω × (I ω + (0, 0, h)) + τ. The gyroscopic moment -ω × (0, 0, h) = (-q h, p h, 0) does no work.
+    I ω' + (0, 0, h') = -ω × (I ω + (0, 0, h)) + τ.
     """
     p, q, r = rate
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
@@ -198,8 +196,8 @@ def _drag_in_space(air: Vector, rate: Vector, speeds: Array | PerRotor, paramete
 def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, parameters: PlantParameters) -> Wrench:
     """Return the ground's wrench: at each point below it a spring and a damper that only push, and friction.
 
-    Friction is Coulomb's up to a stiffness of `slip_damping_n_s_m`: points creep instead of sticking, which keeps the
-    equations smooth. `velocity` is FLU.
+    Friction is Coulomb's up to a stiffness of `slip_damping_n_s_m`: points creep, which keeps the equations smooth.
+    `velocity` is FLU.
     """
     fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     p, q, r = rate
@@ -223,10 +221,7 @@ def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, p
 
 @compiled
 def battery(speeds: Array | PerRotor, charge_ah: float, parameters: PlantParameters) -> tuple[float, float]:
-    """Return the battery's terminal voltage, V, and its current, A.
-
-    V² - V0 V + R P = 0, with V0 falling linearly with the charge used. At most V0² / 4R can be drawn.
-    """
+    """Return terminal voltage, V, and current, A, by V² - V0 V + R P = 0; at most V0² / 4R can be drawn."""
     power_w = 0.0
     for i in range(len(parameters.power)):
         power_w += parameters.power[i] * speeds[i] * speeds[i] * speeds[i]
@@ -239,7 +234,6 @@ def battery(speeds: Array | PerRotor, charge_ah: float, parameters: PlantParamet
 
 @compiled
 def derivative(x: Array, target: PerRotor, parameters: Packed) -> Array:
-    """Return x' = f(x) with the rotors commanded to `target`."""
     change = np.empty_like(x)
     write_derivative(change, x, target, parameters[0])
     return change

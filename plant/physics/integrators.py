@@ -12,8 +12,7 @@ from colibri.common.kernels import power
 from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close, hold, write_derivative
 
-Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float], tuple[Array, float]]
-"""(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `equations`."""
+Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float], tuple[Array, float]]  # as `fixed_step`
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
 RK4_STEP_S = 0.001
@@ -32,16 +31,15 @@ _A = np.array(
         [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ]
 )
-"""Dormand and Prince's weights of the slopes at each stage, the last those of the fifth-order result (FSAL)."""
-_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
-"""Fifth-order less fourth-order weights."""
+"""Weights of the slopes at each stage; the last ones are those of the fifth-order result."""
+_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])  # of orders 5 and 4
 _STAGES = 7
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR, _EXPONENT = 0.9, 0.2, 10.0, -0.2
-_TOO_SMALL = 1e-14
-"""Smallest step, in parts of the frame."""
+_TOO_SMALL = 1e-14  # smallest step, in parts of the frame
 
 
 def fixed_step(x: Array, target: PerRotor, parameters: Packed, duration_s: float) -> tuple[Array, float]:
+    """Return x after `duration_s` of commanded rotor speeds, and the battery's voltage."""
     end = np.empty_like(x)
     return end, runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s), end)
 
@@ -91,8 +89,8 @@ def dormand_prince(
 ) -> tuple[float, bool]:
     """Write x after `duration_s`; return the voltage then, and whether the end was reached.
 
-    Dormand and Prince, J. Comput. Appl. Math. 6(1), 1980; step control as in Hairer, Nørsett and Wanner, Solving
-    Ordinary Differential Equations I, II.4.
+    Dormand and Prince, J. Comput. Appl. Math. 6(1), 1980; step control: Hairer, Nørsett and Wanner, Solving Ordinary
+    Differential Equations I, II.4.
     """
     hold(start, target, parameters, x)
     k = np.empty((_STAGES, x.size))

@@ -39,7 +39,6 @@ class Start(NamedTuple):
 
     @property
     def attitude(self) -> Quaternion:
-        """The unit quaternion that turns FLU into ENU."""
         return quaternion_from_euler(radians(self.phi), radians(self.theta), radians(self.psi))
 
     @property
@@ -52,7 +51,7 @@ class Start(NamedTuple):
 
 
 def check_start(start: Start, vehicle: Vehicle) -> None:
-    """Raise a `VehicleError` if a vehicle cannot start there."""
+    """Raise a VehicleError if a vehicle cannot start there."""
     check_contact(vehicle)
     if not 0.0 <= vehicle.speed_from_rpm(start.rotors) <= vehicle.rotors.max_speed:
         raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
@@ -66,6 +65,6 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
 
 
 def default_starts(vehicle: Vehicle) -> dict[Feedback, Start]:
-    """Return a hover near the thesis's spiral; on sensors below it on the ground, where the estimator initialises."""
+    """Return a hover near the thesis's spiral; on sensors the ground below, where the estimator initialises."""
     flying = Start(y=-1.0, z=2.0, psi=90.0, rotors=vehicle.hover_rpm)
     return {Feedback.STATE: flying, Feedback.SENSORS: Start(y=-1.0, psi=90.0)}

@@ -40,7 +40,6 @@ class World(NamedTuple):
 
 
 def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER) -> World:
-    """Return a world at time 0, with a full battery."""
     check_start(start, vehicle)
     speed = vehicle.speed_from_rpm(start.rotors)
     state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
@@ -59,11 +58,7 @@ class Physics:
         self._wind = self._parameters["wind_enu_m_s"][0]
         self._noise = noise
         self._integrate = solver(integrator)
-        self._idle = vehicle.rotors.idle_speed
-        self._top = vehicle.rotors.max_speed
-        self._battery = vehicle.battery
-        self._as_built = self._parameters.copy()
-        self._power: list[float] = self._parameters["power"][0].tolist()
+        self.become(vehicle)
         self._held: list[float | None] | None = None
         self._standing: PerRotor = (0.0,) * vehicle.rotors.count
         self._end: tuple[World | None, Array] = (None, np.array((*_LEVEL, *self._standing, 0.0)))
@@ -71,10 +66,10 @@ class Physics:
         close_attitude(self._end[1])
 
     def become(self, vehicle: Vehicle) -> None:
-        """Go on with another vehicle, in the same air."""
+        """Fly another vehicle, in the same air."""
         self._parameters[:] = packed(parameters_of(vehicle, self._air.steady or CALM))
         self._as_built = self._parameters.copy()
-        self._power = self._parameters["power"][0].tolist()
+        self._power: list[float] = self._parameters["power"][0].tolist()
         self._idle, self._top, self._battery = vehicle.rotors.idle_speed, vehicle.rotors.max_speed, vehicle.battery
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
@@ -102,7 +97,8 @@ class Physics:
 
     def specific_force(self, world: World) -> Vector:
         """Return the ideal accelerometer reading at the centre of mass, FLU, m/s²."""
-        self._feel_wind(world)
+        if self._air.steady is None:
+            self._wind[:] = world.wind_enu_m_s
         force: Vector = specific_force(self._vector(world), self._parameters)
         return force
 
@@ -117,7 +113,7 @@ class Physics:
         return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
 
     def hold_rotor(self, rotor: int, speed: float | None) -> None:
-        """Hold a rotor at a speed regardless of commands; `None` releases it."""
+        """Hold a rotor at a speed regardless of commands; None releases it."""
         held = self._held or [None] * len(self._standing)
         held[rotor] = speed
         self._held = held if any(it is not None for it in held) else None
@@ -129,7 +125,6 @@ class Physics:
         self._power = self._parameters["power"][0].tolist()
 
     def resist(self, times: float) -> None:
-        """Multiply the battery's resistance."""
         self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
 
     def blow(self, wind: Wind | RecordedWind) -> None:
@@ -145,10 +140,6 @@ class Physics:
     def _vector(self, world: World) -> Array:
         last, x = self._end
         return x if world is last else np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
-
-    def _feel_wind(self, world: World) -> None:
-        if self._air.steady is None:
-            self._wind[:] = world.wind_enu_m_s
 
     def _disturb(self, noise: Noise, target: PerRotor, time_us: int, duration_us: int) -> PerRotor:
         """Set the body's noise; return the commands with that of the motors."""

@@ -31,7 +31,7 @@ _MIN_RATE_HZ = 10
 
 
 class ArduPilotEnd:
-    """Steps a world at each request; `dropped` counts ignored datagrams."""
+    """Steps a world at each request; `is_there` tells whether a program has the address of a silent peer."""
 
     def __init__(
         self,
@@ -41,16 +41,10 @@ class ArduPilotEnd:
         rotors: Rotors,
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
-        """Begin without peer; `is_there` tells whether a program has the address of a silent one."""
-        self._is_there = is_there
-        self._physics = physics
-        self._start = start
-        self._motors = motors
-        self._rotors = rotors
-        self.world = start
+        self._physics, self._motors, self._rotors, self._is_there = physics, motors, rotors, is_there
+        self._start = self.world = start
         self.peer: Address | None = None
-        self.steps = 0
-        self.restarts = 0
+        self.steps = self.restarts = 0
         self.dropped: Counter[str] = Counter()
         self._received_s = 0.0
         self._count: int | None = None
@@ -75,15 +69,12 @@ class ArduPilotEnd:
             self.dropped["repeated"] += 1
             return self._reply
         if self._count is not None and count < self._count:
-            self._begin_again()
+            self.world, self._carried = self._start, 0
+            self.restarts += 1
         self._count = count
         self._advance(rate_hz, fields[_FIRST_ROTOR : _FIRST_ROTOR + self._rotors.count])
         self._reply = _encode(self.world, self._physics)
         return self._reply
-
-    def _begin_again(self) -> None:
-        self.world, self._carried = self._start, 0
-        self.restarts += 1
 
     def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)

@@ -41,8 +41,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     return stop.code
 
 
-REPEATED_AFTER_S = 0.5
-"""Time since the last answer after which a request may have come twice: ArduPilot asks again after about a second."""
+REPEATED_AFTER_S = 0.5  # time since the last answer after which a request may have come twice
 
 
 class ArduPilotServer:
@@ -68,7 +67,7 @@ class ArduPilotServer:
         self._report(self._end.world.time_us, "ended", "ended")
 
     def _answer(self, received: tuple[bytes, Address], now_s: float) -> None:
-        """Answer a request, once even if it was repeated meanwhile, e.g. while the plant was loading.
+        """Answer a request, once even if it was repeated while the plant was busy.
 
         ArduPilot would match a second reply to its next request, and fly one step late from then on.
         """

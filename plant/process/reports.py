@@ -13,15 +13,11 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import GroundLink
 
-MAX_WAIT_S = 0.1
-"""Longest wait between two looks at whether the process shall end."""
-SILENT_AFTER_S = 2.0
-"""Wall-clock silence that is reported."""
+MAX_WAIT_S = 0.1  # between two checks whether the process shall end
+SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
 
 
 class Closable(Protocol):
-    """A link or a log."""
-
     def close(self) -> None: ...
 
 
@@ -51,11 +47,8 @@ class Silence:
     """Reports once that an autopilot is silent, and once that it is back."""
 
     def __init__(self, status: Status, allowed_s: float, back: str, began_s: float) -> None:
-        self._status = status
-        self._allowed_s = allowed_s
-        self._back = back
-        self._since_s = began_s
-        self._reported = False
+        self._status, self._allowed_s, self._back = status, allowed_s, back
+        self._since_s, self._reported = began_s, False
 
     def end(self, now_s: float) -> None:
         if self._reported:

@@ -23,14 +23,14 @@ _CATCH_UP_S = 0.1
 
 
 class FramePacer:
-    """Wall-clock deadlines of frames; a flight held up for longer than a moment stays late instead of hurrying."""
+    """Wall-clock deadlines of frames; a flight that was held up stays late instead of hurrying."""
 
     def __init__(self, speed: float, now_s: float) -> None:
         self.speed = speed
         self._began_s = now_s
 
     def change(self, asked: Iterable[Fault | WorldChange], time_us: int, now_s: float) -> None:
-        """Keep the last pace asked for from now on."""
+        """Adopt the last requested pace."""
         for change in asked:
             if isinstance(change, PaceChange) and isfinite(self.speed):
                 self.speed = change.speed
@@ -56,11 +56,7 @@ class Server:
         *,
         streams_truth: bool = False,
     ) -> None:
-        self._link = link
-        self._end = end
-        self._status = status
-        self._stop = stop
-        self._logs = logs
+        self._link, self._end, self._status, self._stop, self._logs = link, end, status, stop, logs
         self._streams_truth = streams_truth
         self._time_us = 0
         self._logged: World | None = None
@@ -73,7 +69,6 @@ class Server:
         return self._end.peer is not None
 
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
-        """Fly for `duration_s` at `speed` times real time, or until a signal."""
         self._ends = isfinite(duration_s)
         self._began_s = began_s = perf_counter()
         pace, frames = FramePacer(speed, began_s), 0
@@ -119,7 +114,7 @@ class Server:
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
-        """Send a frame until its answer comes; return `None` if a signal came first."""
+        """Send a frame until its answer comes; None if a signal comes first."""
         due_s = now_s = self._offer(plant)
         silence = Silence(self._status, SILENT_AFTER_S, "the autopilot answers again", now_s)
         while not self._stop:
@@ -191,14 +186,7 @@ class FreeServer(Server):
     """Sends each frame when it is due; the rotors follow the newest command, or stop after `cut_after_s` without."""
 
     def __init__(
-        self,
-        link: UdpLink,
-        end: PlantEnd,
-        status: Status,
-        stop: Stop,
-        logs: PlantLogs | None,
-        *,
-        cut_after_s: float,
+        self, link: UdpLink, end: PlantEnd, status: Status, stop: Stop, logs: PlantLogs | None, *, cut_after_s: float
     ) -> None:
         super().__init__(link, end, status, stop, logs)
         self._missing = f"no command for {cut_after_s:g} s"

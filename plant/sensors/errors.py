@@ -8,17 +8,14 @@ from colibri.common.kernels import exp
 from colibri.common.types import Vector
 from colibri.plant.environment.random_streams import Chance
 
-_DRAWN = 128
-"""Samples whose errors are drawn at once."""
+_DRAWN = 128  # samples whose errors are drawn at once
 
 
 class GaussMarkov:
     """A first-order Gauss-Markov drift: after Δ, x exp(-Δ / T) plus noise of variance σ² (1 - exp(-2 Δ / T))."""
 
     def __init__(self, deviation: float, time_s: float, chance: Chance) -> None:
-        self._deviation = deviation
-        self._time_s = time_s
-        self._chance = chance
+        self._deviation, self._time_s, self._chance = deviation, time_s, chance
         self.value = deviation * next(chance)
 
     def after(self, elapsed_s: float) -> float:
@@ -30,15 +27,14 @@ class GaussMarkov:
 class Triad:
     """Three axes of white noise on a random-walk bias, clipped at the sensor's range.
 
-    White noise is a mean over the interval, density / √interval (IEEE Std 952, annex C).
+    `density` is in units / √Hz, `walk` in units / s / √Hz; `turn_on` is the bias's standard deviation. White noise is a
+    mean over the interval, density / √interval (IEEE Std 952, annex C).
     """
 
     def __init__(
         self, density: float, walk: float, turn_on: float, limit: float, interval_s: float, chance: Chance
     ) -> None:
-        """Take units / √Hz for `density`, units / s / √Hz for `walk`; `turn_on` is the bias's standard deviation."""
-        self._limit = limit
-        self._chance = chance
+        self._limit, self._chance = limit, chance
         self._walk, self._noise = walk * sqrt(interval_s), density / sqrt(interval_s)
         self.bias: Vector = (turn_on * next(chance), turn_on * next(chance), turn_on * next(chance))
         self._last = np.array(self.bias)

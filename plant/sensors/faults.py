@@ -29,7 +29,7 @@ class SensorReading:
         self._later.clear()
 
     def report(self, now_us: int, value: Any) -> Any:
-        """Return the output for a measurement; either is `None` without a new value."""
+        """Return the output for a measurement; None without a new value."""
         fault = self._fault
         if fault is None:
             return value

@@ -1,22 +1,16 @@
 """The interface of a sensor: the true world in, its output at that frame out."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import Physics, World
 
-T = TypeVar("T")
-Measure: TypeAlias = Callable[[World], Any]
-"""The world at each frame -> a sensor's output; None without a new one."""
+Measure: TypeAlias = Callable[[World], Any]  # the world at each frame -> a sensor's output; None without a new one
 
 _ROUNDING = 1e-9
-
-
-def as_it_is(value: T, _now_us: int) -> T:
-    return value
 
 
 def vector_sum(value: Vector, error: Vector) -> Vector:
@@ -24,8 +18,6 @@ def vector_sum(value: Vector, error: Vector) -> Vector:
 
 
 class SensorSurroundings(NamedTuple):
-    """The surroundings of a vehicle's sensors."""
-
     physics: Physics
     origin: Geodetic
     interval_s: float
@@ -40,7 +32,7 @@ class Instrument(NamedTuple):
     unit: int  # FAILURE_UNIT
     switched_on: Callable[[Any, SensorSurroundings, Chance], Measure]
     add: Callable[[Any, Vector], Any] = vector_sum  # (value, error of a fault) -> erroneous value
-    at: Callable[[Any, int], Any] = as_it_is  # (value, time in µs) -> value with that time stamp
+    at: Callable[[Any, int], Any] = lambda value, _: value  # (value, time in µs) -> value with that time stamp
 
 
 class Rate:

@@ -35,8 +35,7 @@ class SensorSuite:
         interval_us: int,
         faults: SensorFaults | None = None,
     ) -> None:
-        self._faults = faults
-        self._origin = origin
+        self._faults, self._origin = faults, origin
         setting = SensorSurroundings(physics, origin, interval_us * 1e-6)
         self._chances = chances = streams(seed, RandomStream.SENSORS, len(ROWS))
         self._instruments = [

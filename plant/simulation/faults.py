@@ -14,8 +14,7 @@ class Faults:
     """Active faults of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
-        self._physics = physics
-        self._battery = vehicle.battery
+        self._physics, self._battery = physics, vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)
         self.parts = {Equipment.ROTORS}
         if vehicle.battery is not None:

@@ -74,9 +74,8 @@ class Plant:
         if feedback is Feedback.SENSORS:
             assert vehicle.sensors is not None, "only what has sensors serves them"
             faults = self.faults.sensors
-            self._suite = suite = SensorSuite(
-                vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
-            )
+            suite = SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults)
+            self._suite = suite
             self._measure = suite.measure
             physics.specific_force(world)  # loads it, before any frame
         self._actuation = DelayedCommands(_held(world, vehicle))

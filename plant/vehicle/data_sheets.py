@@ -1,7 +1,7 @@
 """A vehicle file from what a user can read, weigh or measure: data sheets, a ruler and a thrust stand.
 
-Numbers that no data sheet has are estimated. Rotor lag and moments of inertia are estimated high: the law flies a
-vehicle that is quicker than its file, but not one that is twice as slow.
+Rotor lag and moments of inertia are estimated high: the law flies a vehicle that is quicker than its file, but not one
+that is twice as slow.
 """
 
 import csv
@@ -18,8 +18,7 @@ from colibri.plant.vehicle.rotor_numbering import FRAMES, Place
 
 Order: TypeAlias = Literal["px4", "clockwise"]
 Motor: TypeAlias = Literal["brushless", "brushed"]
-LAYOUTS = ("x", "+", "h", *(name for name in FRAMES if name not in ("x", "+")))
-"""Frames of other autopilots; h is x, turning the other way."""
+LAYOUTS = ("x", "+", "h", *(name for name in FRAMES if name not in ("x", "+")))  # h is x, turning the other way
 ORDERS: tuple[Order, ...] = ("px4", "clockwise")
 MOTORS: tuple[Motor, ...] = ("brushless", "brushed")
 
@@ -28,12 +27,9 @@ _M_PER_INCH = 0.0254
 _RAD_S_PER_RPM = 2.0 * pi / 60.0
 _CELL_FULL_V, _CELL_EMPTY_V = 4.2, 3.0
 _MIN_THRUST_TO_WEIGHT = 1.05
-_SMALL_M = 0.06
-"""Propellers below this diameter turn on motors with or without brushes."""
-_TOY_M = 0.1
-"""Propellers below this diameter are steep, and have more drag for their thrust."""
-_LOADED: dict[Motor, float] = {"brushless": 0.65, "brushed": 0.45}
-"""Speed at full throttle over the speed without load, KV times voltage."""
+_SMALL_M = 0.06  # smaller propellers turn on motors with or without brushes
+_TOY_M = 0.1  # smaller propellers are steep, and have more drag for their thrust
+_LOADED: dict[Motor, float] = {"brushless": 0.65, "brushed": 0.45}  # speed at full throttle over KV times voltage
 _APART, _IN_WAKE = 0.1, 0.85
 """Coaxial rotors: half of what they are apart, in diameters; thrust of the lower one, by measurements of 0.8 to 0.9."""
 _OTHER = {"ccw": "cw", "cw": "ccw"}
@@ -58,8 +54,7 @@ class ThrustStand(NamedTuple):
 
     max_thrust_n: float
     max_speed_rad_s: float | None
-    thrust_coefficient: float | None
-    """N s², least squares over all points; None without speeds."""
+    thrust_coefficient: float | None  # N s², least squares over all points
 
 
 class DataSheet(NamedTuple):
@@ -67,21 +62,18 @@ class DataSheet(NamedTuple):
 
     name: str
     mass_kg: float
-    arm_m: float
-    """Centre to motor: half the wheelbase."""
+    arm_m: float  # centre to motor: half the wheelbase
     propeller: Propeller
     layout: str = "x"
     order: Order = "px4"
     motor: Motor | None = None
     kv_rpm_v: float | None = None
     cells: int | None = None
-    hover_throttle: float | None = None
-    """Part of the largest thrust, as PX4's MPC_THR_HOVER and ArduPilot's MOT_THST_HOVER."""
+    hover_throttle: float | None = None  # part of the largest thrust: PX4's MPC_THR_HOVER, ArduPilot's MOT_THST_HOVER
     capacity_ah: float | None = None
     lag_s: float | None = None
     inertia_kg_m2: tuple[float, float, float] | None = None
-    drag_n_s_m: float | None = None
-    """Horizontal drag of the whole vehicle in hover and slow flight."""
+    drag_n_s_m: float | None = None  # horizontal, of the whole vehicle in hover and slow flight
     stand: ThrustStand | None = None
 
     @property
@@ -97,11 +89,7 @@ class DataSheet(NamedTuple):
 
 
 def propeller_of(text: str) -> Propeller:
-    """Read `10x4.5` (inches), `1045` (the same, as printed on propellers), `10`, `45mm` or `45x30mm`.
-
-    Raises:
-        VehicleError: The text is none of these.
-    """
+    """Read `10x4.5` (inches), `1045` (the same), `10`, `45mm` or `45x30mm`, or raise a VehicleError."""
     number = text.strip().lower()
     scale = 0.001 if number.endswith("mm") else _M_PER_INCH
     first, by, second = number.removesuffix("mm").partition("x")
@@ -123,11 +111,7 @@ def propeller_of(text: str) -> Propeller:
 
 
 def thrust_stand_of(text: str) -> ThrustStand:
-    """Read a thrust stand's CSV with columns such as throttle, thrust_g, speed_rpm and current_a.
-
-    Raises:
-        VehicleError: A column or unit is missing or unknown, or the numbers are not those of a rotor.
-    """
+    """Read a thrust stand's CSV, with columns such as throttle, thrust_g and speed_rpm, or raise a VehicleError."""
     rows = [row for row in csv.reader(io.StringIO(text.lstrip("\ufeff"))) if any(cell.strip() for cell in row)]
     columns: dict[str, tuple[int, float]] = {}
     for place, head in enumerate(rows[0] if rows else []):
@@ -189,10 +173,8 @@ def vehicle_file(sheet: DataSheet) -> tuple[str, list[str]]:
         read_settings(tomllib.loads(text), Vehicle)
     except (SettingsError, tomllib.TOMLDecodeError) as error:
         raise VehicleError(f"{sheet.name}: {error}") from error
-    said = (
-        f"thrust {max_n:.3g} N, {ratio:.2f} times the weight; hover at {hover / rotor.max_speed:.2f} of the top speed"
-    )
-    return text, [said, *notes]
+    thrust = f"thrust {max_n:.3g} N, {ratio:.2f} times the weight"
+    return text, [f"{thrust}; hover at {hover / rotor.max_speed:.2f} of the top speed", *notes]
 
 
 def _check(sheet: DataSheet) -> None:
@@ -228,11 +210,9 @@ def _check(sheet: DataSheet) -> None:
 
 def _rotor(sheet: DataSheet) -> tuple[_Rotor, list[str]]:
     """Return thrust coefficient and top speed in rad/s: measured before computed."""
-    stand = sheet.stand
+    stand, speed, speed_from = sheet.stand, None, ""
     notes: list[str] = []
     coefficient, origin = _propeller_coefficient(sheet.propeller), "estimated from the propeller"
-    speed: float | None = None
-    speed_from = ""
     if sheet.kv_rpm_v is not None and sheet.cells is not None:
         loaded = _LOADED[sheet.motor or "brushless"]
         speed = loaded * sheet.kv_rpm_v * sheet.cells * _CELL_FULL_V * _RAD_S_PER_RPM
@@ -263,7 +243,6 @@ def _propeller_coefficient(propeller: Propeller) -> float:
 
 
 def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
-    """Return the texts that the template needs."""
     mass, arm, size = sheet.mass_kg, sheet.arm_m, sheet.propeller.diameter_m
     motors = sheet.motors
     places = [
@@ -277,6 +256,8 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     lag = sheet.lag_s or (0.15 if sheet.motor == "brushed" else max(0.05 * size / 0.254, 0.02))
     drag = sheet.drag_n_s_m
     pitch = "" if sheet.propeller.pitch_given else "; pitch estimated"
+    by = "brushes" if sheet.motor == "brushed" else "size"
+    estimated_drag = "estimated, by mass; of the rotors by tip speed in hover"
     return {
         "name": '"' + sheet.name.replace("\\", "\\\\").replace('"', '\\"') + '"',
         "mass": _text(mass),
@@ -295,13 +276,9 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         "spins": ", ".join(f'"{spin}"' for spin in spins),
         "strength": _strength(motors),
         "lag": _text(lag),
-        "lag_from": "given"
-        if sheet.lag_s
-        else f"estimated, high, by {'brushes' if sheet.motor == 'brushed' else 'size'}",
+        "lag_from": "given" if sheet.lag_s else f"estimated, high, by {by}",
         "drag": _texts((0.05 * mass, 0.05 * mass, 0.08 * mass) if drag is None else (drag, drag, drag)),
-        "drag_from": "estimated, by mass; of the rotors by tip speed in hover"
-        if drag is None
-        else "given, with the rotors'",
+        "drag_from": estimated_drag if drag is None else "given, with the rotors'",
         "rotor_drag": _text(1.2 * mass * _GRAVITY_M_S2 / (2.0 * size * hover * hover) if drag is None else 0.0),
         "feet": ", ".join(_texts((0.6 * x, 0.6 * y)) for x, y, *_ in dict.fromkeys(place[:2] for place in places)),
         "depth": _text(0.3 * arm),

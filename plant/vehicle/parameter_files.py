@@ -11,8 +11,7 @@ from colibri.mavlink.parameters.store import ParamType
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 from colibri.plant.vehicle.description import Rotors, Vehicle, VehicleError
 
-Values: TypeAlias = dict[str, int | float]
-"""Parameters by name: integers are of type INT32, floats of type REAL32."""
+Values: TypeAlias = dict[str, int | float]  # by name; integers are of type INT32, floats of type REAL32
 
 PX4_DELAYS: Final = ("SENS_GPS0_DELAY", "SENS_GNSS0_DELAY", "EKF2_GPS_DELAY")
 """The GPS delay, ms: since March 2026, after that, and before. A PX4 refuses unknown names."""
@@ -135,7 +134,6 @@ def ardupilot_file(vehicle: Vehicle, remark: str) -> str:
 
 
 FILES: Final[dict[str, Callable[[Vehicle, str], str]]] = {"px4": px4_file, "ardupilot": ardupilot_file}
-"""Writers of parameter files by autopilot."""
 
 
 def _alike(vehicle: Vehicle) -> Rotors:

@@ -15,16 +15,12 @@ _FULL_TURN_DEG = 360.0
 
 
 class Place(NamedTuple):
-    """A motor of a frame."""
-
     bearing_deg: float  # clockwise from the front
     direction: str  # as in vehicle files
     level: int = 0  # 1 above, -1 below a motor of the same bearing
 
 
 class Frame(NamedTuple):
-    """A frame that PX4 and ArduPilot know."""
-
     ardupilot: tuple[int, int]  # FRAME_CLASS and FRAME_TYPE
     reversed_type: int | None  # FRAME_TYPE if all motors turn the other way
     motors: tuple[Place, ...]
@@ -75,7 +71,7 @@ class Numbering(NamedTuple):
 
 
 def numbering(position_m: Sequence[tuple[float, ...]], direction: Sequence[str]) -> Numbering | None:
-    """Return the numbering; `None` if the rotors are none of `FRAMES`, or do not turn as in one."""
+    """Return the numbering; None if the rotors are none of `FRAMES`, or do not turn as in one."""
     bearings_deg = [degrees(atan2(-y, x)) for x, y, *_ in position_m]
     heights_m = [place[2] if len(place) > 2 else 0.0 for place in position_m]
     for shape, frame in FRAMES.items():
