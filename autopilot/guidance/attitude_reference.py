@@ -44,13 +44,9 @@ DEFAULT_LIMITS = AttitudeLimits()
 
 
 def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
-    yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
-    slew = DEFAULT_LIMITS.slew
-    return DEFAULT_LIMITS._replace(
-        stick_tilt_rad=radians(behaviour.max_tilt_deg),
-        stick_yaw_rate_rad_s=yaw_rate_rad_s,
-        slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
-    )
+    tilt_rad, rate_rad_s, slew = radians(behaviour.max_tilt_deg), behaviour.stick_yaw_rate_rad_s, DEFAULT_LIMITS.slew
+    slew = slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, rate_rad_s))
+    return DEFAULT_LIMITS._replace(stick_tilt_rad=tilt_rad, stick_yaw_rate_rad_s=rate_rad_s, slew=slew)
 
 
 class ReferenceMemory(NamedTuple):

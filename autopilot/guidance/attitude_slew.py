@@ -1,7 +1,6 @@
-"""Kernels that slew an attitude demand.
+"""Kernels that slew an attitude demand by v' = w² (target - x) + 2 w (target' - v), bounded.
 
-v' = w² (target - x) + 2 w (target' - v), bounded; for a rate only v' = 2 w (target' - v). A maximum acceleration of at
-least w times the maximum rate avoids overshoot.
+For a rate only v' = 2 w (target' - v). A maximum acceleration of at least w times the maximum rate avoids overshoot.
 """
 
 from math import floor, isnan, pi, sqrt
@@ -31,19 +30,13 @@ class Slew(NamedTuple):
 
 
 class AttitudeCommand(NamedTuple):
-    """Target of a demand.
-
-    Attributes:
-        vector: TILT: phi, theta, rad, and 0. ATTITUDE: thrust direction, ENU. RATE: p, q, r, rad/s.
-        yaw_rate_rad_s: TILT: turn rate. ATTITUDE: feed-forward.
-        thrust_n: nan stands for the thrust that carries the weight at any tilt.
-    """
+    """Target of a demand."""
 
     kind: int
-    vector: Vector
+    vector: Vector  # TILT: phi, theta, rad, 0. ATTITUDE: thrust direction, ENU. RATE: p, q, r, rad/s
     yaw_rad: float
-    yaw_rate_rad_s: float
-    thrust_n: float
+    yaw_rate_rad_s: float  # TILT: turn rate. ATTITUDE: feed-forward
+    thrust_n: float  # nan: the thrust that carries the weight at any tilt
 
 
 @compiled

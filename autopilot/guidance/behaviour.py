@@ -14,10 +14,9 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 class Behaviour:
     """Numbers of the vehicle's behaviour, described in `parameters/behaviour.py`; 0 switches a limit or disarming off.
 
-    `delay_s` of commands is compensated; negative: the profile's, or measured. The numbers from `return_delay_s` on are
-    set by an identity's parameters (`parameters/behaviour.py`): a return waits above home for `return_delay_s`, ends
-    `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`; landings
-    are slow below `land_slow_below_m`.
+    An identity sets those from `return_delay_s` on: a return waits above home for `return_delay_s`, ends
+    `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`.
+    Landings are slow below `land_slow_below_m`.
     """
 
     limits: Limits = _LIMITS
@@ -46,7 +45,7 @@ class Behaviour:
     rotor_failure: int = 1
     inject_failures: bool = False
     solve_time_s: float = 0.0
-    delay_s: float = -0.001
+    delay_s: float = -0.001  # of commands, compensated; negative: the profile's, or measured
     return_delay_s: float = 0.0
     return_final_m: float = 0.0
     return_cone: float = 0.0

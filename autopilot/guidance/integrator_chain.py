@@ -8,7 +8,7 @@ With e = reference - target, each loop commands the next:
     snap          s_t + k_j (wanted jerk - j)
 
 and bounds its addition to the target's motion. The jerk must be able to end the acceleration within 1 / k_v. The snap
-is bounded because the moments produce it. A reached target is followed exactly.
+is bounded because the moments produce it.
 """
 
 from functools import lru_cache
@@ -23,18 +23,12 @@ from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
 
-K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
-"""Gains, 1/s: each loop is about three times as fast as the outer one."""
+K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0  # 1/s: each about three times the outer one
 K_YAW, K_YAW_RATE = 2.0, 8.0
-_MAX_STEP_S = 0.02
-"""Stability limit of the jerk loop: 36 / s times this is below 1."""
-_JERK_ENDS_S = 0.11
-"""Time to end the largest jerk by the largest snap: less than 1 / k_a is useless, more overshoots."""
-_STOPPING = 0.6
-"""Part of the acceleration planned for stopping; the rest is for tracking it."""
-
-_JERK, _JERK_SCALE = 3, 1e-2
-"""Jerk settles last, and has the largest numbers."""
+_MAX_STEP_S = 0.02  # stability limit of the jerk loop: K_JERK times this is below 1
+_JERK_ENDS_S = 0.11  # to end the largest jerk by the largest snap: less than 1 / k_a is useless, more overshoots
+_STOPPING = 0.6  # part of the acceleration planned for stopping; the rest is for tracking it
+_JERK, _JERK_SCALE = 3, 1e-2  # jerk settles last, and has the largest numbers
 
 
 class Limits(NamedTuple):
@@ -85,7 +79,7 @@ def advance(
     limits: Packed,
     dt: float,
 ) -> tuple[Array, Array]:
-    """Return motion, (5, n, 3), and heading, (3, n), from now on.
+    """Return motion, (5, n, 3), and heading, (3, n), from now on; a long `dt` takes several steps.
 
     Args:
         motion: Position to jerk now, ENU, (4, 3).
@@ -94,7 +88,7 @@ def advance(
         kinds: Binding derivative of each axis, (3,).
         target_heading: Yaw, rate, acceleration, (n, 3).
         turns: Whether yaw binds; otherwise its rate.
-        dt: Between instants, s; long ones take several steps.
+        dt: Between instants, s.
     """
     count = target.shape[0]
     out, out_heading = np.empty((5, count, 3)), np.empty((3, count))

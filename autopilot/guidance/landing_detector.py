@@ -12,31 +12,19 @@ _STILL_M_S = 0.15
 _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
 _DRIFTING_FOR_US = 600_000
-CARRIED = 0.5
-"""Thrust relative to weight below which a vehicle of unknown velocity falls or stands."""
-
+CARRIED = 0.5  # thrust relative to weight below which a vehicle of unknown velocity falls or stands
 _MODEL_ERROR, _UNCARRIED_S = 0.2, 0.5
 """Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 5 m/s faster."""
 _UNCARRIED_STILL_S, _FALLS_M_S2 = 0.2, 4.0
 """The same where the climb rate falls by less than this per second of weight: in the air by more than 9."""
-_JUMP_M_S = 1.0
-"""Change of the climb rate in one sample that no force causes: the estimate was corrected, or the ground was hit."""
-SUSPECTED_S = 0.1
-"""Lack of lift from which on a failed sensor may take the ground for a motion."""
-
+_JUMP_M_S = 1.0  # change of the climb rate in a sample that no force causes: a corrected estimate, or the ground
+SUSPECTED_S = 0.1  # lack of lift from which on a failed sensor may take the ground for a motion
 _CLEAR_M = 0.3
-
-HARD_M_S, HARD_UP = 3.0, 0.5
-"""Speed, and cosine of the tilt, beyond which a contact is an impact."""
-HARD_WITHIN_US = 4_000_000
-"""A landing is detected at most so long after its contact."""
-
+HARD_M_S, HARD_UP = 3.0, 0.5  # speed, and cosine of the tilt, beyond which a contact is an impact
+HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its contact
 KNOCK_SAMPLES = 6
-_KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0
-"""Change of velocity within so many samples, and acceleration, that only a contact causes."""
-
-HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0
-"""Height that is missing after a fall, and largest distance from where the vehicle stood last."""
+_KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0  # velocity change within so many samples, and acceleration, of a contact alone
+HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0  # missing height after a fall, and largest distance from the last standing place
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
@@ -57,9 +45,8 @@ def watch(
 ) -> tuple[Landing, bool]:
     """Return the state, and whether the vehicle stands: still for long while it `sinks`.
 
-    If the velocity estimate `drifts`, as without GPS, only its changes count: at half thrust the vehicle would
-    accelerate, so a constant climb rate means that the ground holds it. If wind `slides` it along the ground, only its
-    climb rate counts.
+    If the velocity estimate `drifts`, as without GPS, only its changes count: at half thrust a vehicle in the air would
+    accelerate. If wind `slides` it along the ground, only its climb rate counts.
     """
     if not sinks:
         return _MOVES, False
@@ -85,24 +72,19 @@ class Lack(NamedTuple):
     last_m_s: float = 0.0
 
     def after(self, lift: float, climb_m_s: float, interval_s: float) -> "Lack":
-        """Add a sample; `lift` is the rotors', in parts of weight. It begins anew where the estimate jumps."""
+        """Add a sample of the rotors' lift, in parts of weight; restart if the estimate jumps."""
         if abs(climb_m_s - self.last_m_s) > _JUMP_M_S:
             return Lack(0.0, climb_m_s, climb_m_s)
         lack_s = max(self.lack_s + (1.0 - _MODEL_ERROR - lift) * interval_s, 0.0)
         return Lack(lack_s, self.climb_m_s if self.lack_s and lack_s else climb_m_s, climb_m_s)
 
     def is_carried(self, climb_m_s: float) -> bool:
-        """Whether the ground carries the vehicle, which lacks lift for long and yet comes down on purpose.
-
-        It takes less time if the climb rate does not fall as it would in the air.
-        """
+        """Whether the ground carries the vehicle: it lacks lift for long, less so if it does not fall."""
         falls = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s
         return self.lack_s >= (_UNCARRIED_S if falls else _UNCARRIED_STILL_S)
 
 
 class Motion(NamedTuple):
-    """The velocity at one time."""
-
     time_us: int
     velocity_enu_m_s: Vector
 

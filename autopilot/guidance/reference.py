@@ -1,13 +1,10 @@
-"""The reference, which moves smoothly to a target.
-
-Once reached, the target itself is the reference, to the last bit, until it jumps.
-"""
+"""The reference, which moves smoothly to a target, and follows it to the last bit once reached, until it jumps."""
 
 from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache
 from math import pi
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,10 +14,8 @@ from colibri.autopilot.guidance.integrator_chain import Integers, Limits
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
-_REACHED = 1e-5
-"""Largest distance of the chain, whose snap changes once a sample, from a moving target."""
-_CARRIED = 1e-2
-"""The same for a reference extrapolated by its derivatives."""
+_REACHED = 1e-5  # largest distance of the chain, whose snap changes once a sample, from a moving target
+_CARRIED = 1e-2  # the same for a reference extrapolated by its derivatives
 
 
 class BindingDerivative(IntEnum):
@@ -29,7 +24,8 @@ class BindingDerivative(IntEnum):
     ACCELERATION = 2
 
 
-ALL_BOUND = (BindingDerivative.POSITION, BindingDerivative.POSITION, BindingDerivative.POSITION)
+Kinds: TypeAlias = tuple[BindingDerivative, BindingDerivative, BindingDerivative]
+ALL_BOUND: Kinds = (BindingDerivative.POSITION, BindingDerivative.POSITION, BindingDerivative.POSITION)
 
 
 class Reference(NamedTuple):
@@ -44,17 +40,12 @@ class Reference(NamedTuple):
 
 
 class Target(NamedTuple):
-    """Target at each instant: position to snap, ENU, (n, 5, 3); yaw, rate, acceleration, (n, 3).
-
-    Attributes:
-        kinds: Binding derivative of x, y and z.
-        turns: Whether yaw binds; otherwise its rate.
-    """
+    """Target at each instant: position to snap, ENU, (n, 5, 3); yaw, rate, acceleration, (n, 3)."""
 
     motion: Array
-    kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative]
+    kinds: Kinds  # binding derivative of x, y and z
     heading: Array
-    turns: bool = True
+    turns: bool = True  # yaw binds; otherwise its rate
 
 
 def at_rest(state: VehicleState) -> Reference:
@@ -75,16 +66,11 @@ def slowed(reference: Reference, speed: float) -> Reference:
     return Reference(reference.motion * powers, reference.heading * np.array([1.0, speed]))
 
 
-def still_target(
-    position_enu_m: Sequence[float],
-    yaw_rad: float,
-    samples: int,
-    kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative] | None = None,
-) -> Target:
+def still_target(position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: Kinds = ALL_BOUND) -> Target:
     motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
     motion[:, 0] = position_enu_m
     heading[:, 0] = yaw_rad
-    return Target(motion, kinds or ALL_BOUND, heading)
+    return Target(motion, kinds, heading)
 
 
 def target_of(horizon: Horizon) -> Target:
@@ -98,10 +84,7 @@ def target_of(horizon: Horizon) -> Target:
 def lead(
     reference: Reference, target: Target, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """Return the references, and the chain's state at the second instant.
-
-    A reference that `waited` was extrapolated, so it may be farther from the target.
-    """
+    """Return the references, and the chain's state at the second instant; one that `waited` was extrapolated."""
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
         return _on_target(reference, target)
@@ -119,7 +102,7 @@ def lead(
 
 
 @cache
-def _integers(kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative]) -> Integers:
+def _integers(kinds: Kinds) -> Integers:
     return np.array(kinds, dtype=np.int64)
 
 

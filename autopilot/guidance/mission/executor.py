@@ -22,12 +22,9 @@ ACTIVE: int = mav.MISSION_STATE_ACTIVE
 PAUSED: int = mav.MISSION_STATE_PAUSED
 COMPLETE: int = mav.MISSION_STATE_COMPLETE
 
-MAX_ITEMS_A_STEP = 16
-"""Maximum of items started in a step."""
-REST_US = 1_000_000
-"""Delay between jumps of a mission without flight between them."""
-CIRCLING_AFTER = 3
-"""Jumps without flight between them."""
+MAX_ITEMS_A_STEP = 16  # started in a step
+REST_US = 1_000_000  # delay between jumps without flight between them
+CIRCLING_AFTER = 3  # jumps without flight between them
 _HOLD = Hold()
 _DEFAULTS = Defaults()
 _FLYING, _SUSPENDED = 1, 2
@@ -61,28 +58,20 @@ class MissionStep(NamedTuple):
 
 
 class MissionRecord(NamedTuple):
-    """Progress of a mission for a restart.
-
-    Attributes:
-        jumps: Remaining jumps, by item.
-        mission_context: At the start of the item, like `defaults` and `order_before`.
-        phases: Remaining phases of the item.
-        fresh: Whether the phase began in the last step.
-        jumped: Number of jumps since the last flight.
-    """
+    """Progress of a mission for a restart; context, defaults and order before are of the start of the item."""
 
     seq: int
     state: int
     order: OrderRecord
     speed_m_s: float | None
-    jumps: dict[int, int]
+    jumps: dict[int, int]  # left, by item
     mission_context: MissionContext | None
     defaults: Defaults
     order_before: OrderRecord
-    phases: int
+    phases: int  # left of the item
     since_us: int
-    fresh: bool
-    jumped: int
+    fresh: bool  # the phase began in the last step
+    jumped: int  # jumps since the last flight
     rest_until_us: int
 
 

@@ -1,8 +1,7 @@
-"""The geofence: polygons and circles.
+"""The geofence: polygons and circles, items MAV_CMD_NAV_FENCE_* of https://mavlink.io/en/messages/common.html.
 
-Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and following. The vehicle must be
-inside all inclusion zones of one group (parameter 2), and outside all exclusion zones. Circles of radius 0 are
-placeholders.
+The vehicle must be inside all inclusion zones of one group (parameter 2), and outside all exclusion zones. Circles of
+radius 0 are placeholders.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,8 +29,7 @@ POLYGONS: tuple[int, ...] = (
 CIRCLES: tuple[int, ...] = (mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
 INCLUSIONS: tuple[int, ...] = (POLYGONS[0], CIRCLES[0])
 FEWEST_VERTICES = 3
-EDGE_M = 1e-6
-"""Tolerance for points on an edge, which count as inside."""
+EDGE_M = 1e-6  # tolerance for points on an edge, which count as inside
 OUTSIDE = Refusal("outside the geofence")
 
 
@@ -138,7 +136,6 @@ class Geofence:
         return margins
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return the depth inside, m; negative outside."""
         if not all(map(isfinite, position_enu_m)):
             return -inf
         return float(self.margins_m(np.array([position_enu_m[:2]]))[0])
@@ -156,7 +153,6 @@ class AroundHome(NamedTuple):
     floor_m: float = -inf
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return the depth inside, m; negative outside."""
         east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
@@ -169,12 +165,9 @@ class AroundHome(NamedTuple):
             return None
         if position_enu_m[2] - self.home_enu_m[2] < self.floor_m:
             return Refusal(f"less than {self.floor_m:g} m above home")
-        too_high = 0.0 < self.max_height_m < position_enu_m[2] - self.home_enu_m[2]
-        return Refusal(
-            f"more than {self.max_height_m:g} m above home"
-            if too_high
-            else f"more than {self.max_distance_m:g} m from home"
-        )
+        if 0.0 < self.max_height_m < position_enu_m[2] - self.home_enu_m[2]:
+            return Refusal(f"more than {self.max_height_m:g} m above home")
+        return Refusal(f"more than {self.max_distance_m:g} m from home")
 
 
 def _zones(items: Sequence[MissionItem]) -> Iterator[Sequence[MissionItem]]:

@@ -1,7 +1,4 @@
-"""Accepted mission items and their allowed values; nan is the default.
-
-https://mavlink.io/en/messages/common.html#mav_commands
-"""
+"""Accepted mission items (https://mavlink.io/en/messages/common.html#mav_commands); nan is the default of a value."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite, isnan
@@ -144,7 +141,6 @@ def is_here(item: MissionItem) -> bool:
 
 
 def place_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> Vector:
-    """Return the place of an item, m, ENU."""
     x, y, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
     return (x, y, height_of(item, home_enu_m, origin))
 
@@ -169,7 +165,6 @@ def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -
 
 
 def rally_places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
-    """Yield sequence number and place, m, ENU, of rally points."""
     return ((seq, place_of(item, home_enu_m, origin)) for seq, item in enumerate(items))
 
 

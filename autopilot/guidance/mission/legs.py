@@ -14,7 +14,6 @@ from colibri.mavlink.wire.dialect import mav
 MIN_RADIUS_M = 1.0
 _TURNED_RAD = radians(5.0)
 _TURN_WITHIN_S = 30.0
-"""Timeout of a turn."""
 
 
 class MissionContext(NamedTuple):
@@ -50,11 +49,14 @@ class ItemContext(NamedTuple):
         return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
 
 
+EndCondition: TypeAlias = Callable[[MissionContext, float], bool]
+
+
 class LegPhase(NamedTuple):
     """A part of an item: order (None keeps the previous), end condition, and whether it reaches the item."""
 
     order: Order | None
-    ends: Callable[[MissionContext, float], bool]
+    ends: EndCondition
     reaches: bool = False
 
 
@@ -168,15 +170,15 @@ def _or_zero(value: float) -> float:
     return 0.0 if isnan(value) else value
 
 
-def _within(place: Vector, radius_m: float) -> Callable[[MissionContext, float], bool]:
+def _within(place: Vector, radius_m: float) -> EndCondition:
     return lambda now, _: now.arrived or dist(now.position_enu_m, place) <= radius_m
 
 
-def _above(height_m: float) -> Callable[[MissionContext, float], bool]:
+def _above(height_m: float) -> EndCondition:
     return lambda now, _: now.arrived or now.position_enu_m[2] >= height_m
 
 
-def _after(wait_s: float) -> Callable[[MissionContext, float], bool]:
+def _after(wait_s: float) -> EndCondition:
     return lambda _, since_s: since_s >= wait_s
 
 

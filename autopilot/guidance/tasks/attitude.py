@@ -12,8 +12,7 @@ from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, P
 from colibri.common.kernels import cos
 from colibri.mavlink.setpoints.setpoints import Sticks
 
-_LIFTING, _SINKING = 0.9, 0.5
-"""Thrust relative to weight: take-off above, certain sinking below."""
+_LIFTING, _SINKING = 0.9, 0.5  # thrust relative to weight: take-off above, certain sinking below
 _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
 """Poles of the height loop near -3 and -2, 1/s; the integral compensates a wrong mass or a weak battery."""
 _MAX_LIFT_M_S2, _MAX_OFFSET_M_S2 = 6.0, 4.0
@@ -22,8 +21,6 @@ _RESTS_M_S = 0.025
 
 
 class TiltLoop:
-    """Slews attitude and thrust by a generator."""
-
     def __init__(self, generator: AttitudeReference) -> None:
         self.generator = generator
         self._memory: ReferenceMemory | None = None

@@ -11,10 +11,8 @@ from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, T
 from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
-MIN_HEIGHT_M = 1.0
-"""Above home: PX4's MINIMUM_SAFETY_ALTITUDE."""
-ABOVE_TARGET = 2
-"""Value of `Behaviour.follow_altitude_mode`; the others refer to flat ground."""
+MIN_HEIGHT_M = 1.0  # above home: PX4's MINIMUM_SAFETY_ALTITUDE
+ABOVE_TARGET = 2  # of `Behaviour.follow_altitude_mode`; the others refer to flat ground
 
 
 class FollowTargetTask(EndlessTask):

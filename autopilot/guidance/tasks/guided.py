@@ -21,24 +21,16 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoi
 
 STOP = PositionSetpoint(velocity_m_s=(0.0, 0.0, 0.0))
 _HOVER, _LEAD_RAD = 0.5, 0.5 * pi
-_ALONG_BEYOND_M, _ALONG_ABOVE_M_S = 2.0, 0.5
-"""Shorter ways and lower speeds keep the heading."""
+_ALONG_BEYOND_M, _ALONG_ABOVE_M_S = 2.0, 0.5  # shorter ways and lower speeds keep the heading
 
 
 class GuidedSettings(NamedTuple):
-    """Settings of GUIDED.
+    """Settings of GUIDED."""
 
-    Attributes:
-        lapse_us: Time after which all but positions lapse (GUID_TIMEOUT).
-        looks_ahead: Whether the vehicle looks along its way (WP_YAW_BEHAVIOR).
-        by_thrust: Whether an attitude has a thrust, or a climb rate (GUID_OPTIONS).
-        hover: Thrust of hover, 0..1 (MOT_THST_HOVER).
-    """
-
-    lapse_us: int
-    looks_ahead: bool
-    by_thrust: bool
-    hover: float
+    lapse_us: int  # of all but positions (GUID_TIMEOUT)
+    looks_ahead: bool  # along its way (WP_YAW_BEHAVIOR)
+    by_thrust: bool  # an attitude has a thrust, not a climb rate (GUID_OPTIONS)
+    hover: float  # thrust of hover, 0..1 (MOT_THST_HOVER)
 
 
 class Turn(NamedTuple):
@@ -66,7 +58,6 @@ class GuidedTask(EndlessTask):
 
     @property
     def setpoint(self) -> PositionSetpoint | None:
-        """The position setpoint that is flown."""
         return self._setpoint if isinstance(self._setpoint, PositionSetpoint) else None
 
     @property
@@ -78,7 +69,7 @@ class GuidedTask(EndlessTask):
         return GoTo(setpoint.position_enu_m, None if isnan(setpoint.yaw_rad) else setpoint.yaw_rad)
 
     def take(self, setpoint: OffboardSetpoint, context: TaskContext, *, keeps_turn: bool = False) -> None:
-        """Fly a setpoint from now on; velocities along the heading stay as they are on earth."""
+        """Fly a setpoint; velocities along the heading stay as they are on earth."""
         self.paused = False
         if isinstance(setpoint, PositionSetpoint):
             setpoint = setpoint.in_enu(context.state.euler[2])._replace(time_us=context.now_us)

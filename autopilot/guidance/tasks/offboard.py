@@ -14,8 +14,7 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoi
 
 UP = 2
 MAX_RATES_AGE_US = 300_000
-_BRAKE_1_S = 2.0
-"""Rate at which an acceleration fades near the speed limit."""
+_BRAKE_1_S = 2.0  # rate at which an acceleration fades near the speed limit
 
 
 class OffboardTask(EndlessTask):
@@ -29,9 +28,8 @@ class OffboardTask(EndlessTask):
             if self._tilt:
                 self._tilt.forget()
             self._hold = HoldTask()
-            return PositionMotion(
-                position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits
-            )
+            target = position_target(setpoint.in_enu(context.state.euler[2]), context)
+            return PositionMotion(target, context.behaviour.limits)
         if isinstance(setpoint, AttitudeSetpoint) and self._tilt and not rates_stale(setpoint, context.now_us):
             self._hold = HoldTask()
             return self._tilt.by_command(self._tilt.generator.from_setpoint(setpoint), context)

@@ -14,10 +14,8 @@ from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array, Vector
 from colibri.mavlink.wire.dialect import mav
 
-_SHARE = 0.8
-"""Part of the horizontal acceleration allowed for the circle."""
-_ON_IT_M, _ON_IT_M_S = 0.3, 0.5
-"""Distance to the circle and radial speed at which the circle is joined."""
+_SHARE = 0.8  # part of the horizontal acceleration allowed for the circle
+_ON_IT_M, _ON_IT_M_S = 0.3, 0.5  # distance and radial speed at which the circle is joined
 
 
 class OrbitTask(EndlessTask):

@@ -11,8 +11,7 @@ from colibri.common.types import Vector
 class GoTo(NamedTuple):
     """Fly to a place and stay; yaw None is along the way, speed None the cruise speed.
 
-    `turn` is the way to turn: 1 counter-clockwise, -1 clockwise, 0 the shorter one. The vehicle has arrived when it has
-    been there for `stay_s`.
+    `turn` is the way to turn: 1 counter-clockwise, -1 clockwise, 0 the shorter one. The vehicle arrives after `stay_s`.
     """
 
     position_enu_m: Vector
@@ -63,8 +62,6 @@ _KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Orbi
 
 
 class OrderRecord(NamedTuple):
-    """An order as plain data: class name and fields."""
-
     kind: str
     fields: tuple[Any, ...]
 

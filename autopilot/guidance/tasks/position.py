@@ -20,22 +20,14 @@ from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 
-Leg: TypeAlias = Callable[[TaskContext], FlightTask]
-"""Starts a task."""
-
-_ALONG_BEYOND_M = 1.0
-"""Shorter ways keep the heading."""
-_THERE_M, _THERE_M_S = 0.3, 0.5
-"""Distance and speed at arrival; the reference settles the rest."""
-_REST_M_S = 0.05
-_REST_RAD_S = 0.05
+Leg: TypeAlias = Callable[[TaskContext], FlightTask]  # starts a task
+_ALONG_BEYOND_M = 1.0  # shorter ways keep the heading
+_THERE_M, _THERE_M_S = 0.3, 0.5  # distance and speed at arrival; the reference settles the rest
+_REST_M_S, _REST_RAD_S = 0.05, 0.05
 _FACING_RAD, _LEAD_RAD = radians(5.0), 0.5 * pi
-_BELOW_FENCE = 0.9
-"""Part of the height fence that a return climbs to."""
-_LEAST_CLIMB_M = 2.5
-"""Climb of a return within a cone (RTL_ABS_MIN_CLIMB)."""
-_FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
-"""Descent speed per height, down to the landing speed at this height."""
+_BELOW_FENCE = 0.9  # part of the height fence that a return climbs to
+_LEAST_CLIMB_M = 2.5  # of a return within a cone (RTL_ABS_MIN_CLIMB)
+_FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0  # descent speed per height, down to the landing speed at this height
 
 
 class GoToTask:
@@ -142,8 +134,7 @@ class LandTask(EndlessTask):
     """Sink vertically, slower near the ground."""
 
     def __init__(self, xy: tuple[float, float], yaw_rad: float | None) -> None:
-        self._xy = xy
-        self._yaw_rad = yaw_rad
+        self._xy, self._yaw_rad = xy, yaw_rad
 
     def update(self, context: TaskContext) -> PositionMotion:
         behaviour = context.behaviour
@@ -204,11 +195,8 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        self.start = start
-        self._planner = planner
-        self._planner_for_law = planner_for_law
-        self._duration_s = duration_s
-        self.began_us = began_us
+        self.start, self.began_us = start, began_us
+        self._planner, self._planner_for_law, self._duration_s = planner, planner_for_law, duration_s
 
     def update(self, context: TaskContext) -> PlannedMotion:
         since_us = context.now_us - self.began_us

@@ -23,26 +23,19 @@ NOT_STEERED = ClientInputs()
 
 
 class TaskContext(NamedTuple):
-    """Inputs of a task.
+    """Inputs of a task."""
 
-    Attributes:
-        now_us: Path time at which commands take effect.
-        samples: Instants of a target.
-        ground_m: z of ENU at the last standing position.
-        blind: Whether the position is unusable.
-    """
-
-    now_us: int
+    now_us: int  # path time at which commands take effect
     state: VehicleState
     reference: Reference
     home_enu_m: Vector
     behaviour: Behaviour
     interval_s: float
-    samples: int
+    samples: int  # instants of a target
     steered: ClientInputs = NOT_STEERED
     standing: bool = False
-    ground_m: float = 0.0
-    blind: bool = False
+    ground_m: float = 0.0  # z of ENU at the last standing position
+    blind: bool = False  # the position is unusable
     home_yaw_rad: float = 0.0
 
     @property
@@ -82,7 +75,7 @@ class PlannedMotion(NamedTuple):
 
 
 class AttitudeMotion(NamedTuple):
-    """Motion by attitude and thrust, and whether it lifts off, sinks, or lacks a reliable velocity (`drifts`)."""
+    """Motion by attitude and thrust: whether it lifts off, sinks, or lacks a reliable velocity (`drifts`)."""
 
     demand: AttitudeDemand
     reference: Reference
@@ -95,9 +88,7 @@ TaskOutput: TypeAlias = PositionMotion | PlannedMotion | AttitudeMotion
 
 
 class FlightTask(Protocol):
-    def update(self, context: TaskContext) -> TaskOutput:
-        """Called once a control sample."""
-        ...
+    def update(self, context: TaskContext) -> TaskOutput: ...
 
     def arrived(self, context: TaskContext) -> bool: ...
 

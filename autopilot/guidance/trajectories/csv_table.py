@@ -14,8 +14,7 @@ from colibri.common.types import Array
 
 MAX_DURATION_S = 3600.0
 
-_MAX_NUMBER = 1e4
-"""Limit of every number, in its unit."""
+_MAX_NUMBER = 1e4  # limit of every number, in its unit
 _ROUNDING_S = 1e-6
 
 
@@ -69,9 +68,8 @@ def read_table(
 ) -> CsvTable:
     """Read a CSV file, or its `text`; TrackFileError if malformed.
 
-    Args:
-        aliases: Other names, in lower case, with the column and the factor to its unit. With them the case of names is
-            ignored, and unknown columns are left out.
+    `aliases` are other names, in lower case, with the column and the factor to its unit. With them the case of names is
+    ignored, and unknown columns are left out.
     """
     try:
         lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()

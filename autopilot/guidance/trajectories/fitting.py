@@ -16,17 +16,12 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position, thro
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array
 
-ROUNDING_M = 1e-3
-"""Tolerance below the floor."""
-
-_CLEARANCE_M = 0.25
-"""Height of a corrected dip above the floor, if both ends of its leg are at least twice as high."""
+ROUNDING_M = 1e-3  # tolerance below the floor
+_CLEARANCE_M = 0.25  # height of a corrected dip, if both ends of its leg are at least twice as high
 _HOLDS = 20
 _STRETCHES = 80
-_STRETCH = (1.02, 1.25)
-"""Stretch of a leg in one pass."""
-_WIDENING = 4
-"""Passes after which twice as many neighbours are stretched too: finally all, which leads to a hover."""
+_STRETCH = (1.02, 1.25)  # of a leg in one pass
+_WIDENING = 4  # passes after which twice as many neighbours are stretched too: finally all, which leads to a hover
 _LISTED = 3
 
 

@@ -89,7 +89,6 @@ def with_file(name: str, path: Path) -> str:
 
 
 def file_of(name: str) -> str | None:
-    """Return the file of a track, if it has one."""
     base, colon, text = name.partition(":")
     options = read_options(base, OPTIONS[base], text) if colon and base in OPTIONS else None
     return options.file if isinstance(options, FileOptions) else None

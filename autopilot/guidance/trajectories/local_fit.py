@@ -10,7 +10,7 @@ _DEGREE = 4
 def local_fit(times_s: Array, values: Array, count: int) -> tuple[Array, Array, Array]:
     """Return the smoothed `values` (n, axes) and their first two derivatives.
 
-    Each is of the polynomial of fourth degree through the nearest `count` samples in the least squares.
+    Each is of the least-squares polynomial of degree 4 through the nearest `count` samples.
     """
     n = len(times_s)
     count = min(count, n)

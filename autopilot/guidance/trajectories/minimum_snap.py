@@ -1,8 +1,7 @@
 """Piecewise polynomials through points that minimise a squared derivative.
 
-D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011; solved as in C.
-Richter, A. Bry and N. Roy, "Polynomial trajectory planning for aggressive quadrotor flight", ISRR 2013: the unknowns
-are derivatives at inner points, so that the system is positive definite and couples only neighbours.
+D. Mellinger and V. Kumar, ICRA 2011; solved as in C. Richter, A. Bry and N. Roy, ISRR 2013: the unknowns are
+derivatives at inner points, so that the system is positive definite and couples only neighbours.
 """
 
 from dataclasses import dataclass
@@ -39,8 +38,7 @@ class PiecewisePolynomial:
 def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
     """Return the curve through `points` (n, axes) at `times_s`, n >= 2, at rest at both ends.
 
-    `order` is `SNAP` or `ACCELERATION`. Derivatives below it are continuous because they are shared, those up to 2
-    order - 2 by optimality.
+    `order` is `SNAP` or `ACCELERATION`; derivatives up to 2 order - 2 are continuous.
     """
     return interpolate(times_s, minimal_knots(elements(np.diff(times_s), stiffness(order)), points))
 

@@ -6,23 +6,16 @@ import numpy as np
 
 from colibri.common.types import Array
 
-_INSIDE = 0.999
-"""At the edge itself the slope of a variable vanishes."""
+_INSIDE = 0.999  # at the edge itself the slope of a variable vanishes
 
 
 @dataclass(frozen=True, slots=True)
 class Openings:
-    """What each waypoint is widened to: all that `centres + axes · q` reaches for q in a unit ball, or a unit box.
+    """What each waypoint is widened to: all that `centres + axes · q` reaches for q in a unit ball, or a unit box."""
 
-    Attributes:
-        centres_enu_m: (n, 3).
-        axes_m: Half axes in columns, ENU, (n, 3, 3); 0 where a point is kept.
-        together: 1 for a ball, (3, 3); the identity for a box.
-    """
-
-    centres_enu_m: Array
-    axes_m: Array
-    together: Array
+    centres_enu_m: Array  # (n, 3)
+    axes_m: Array  # half axes in columns, ENU, (n, 3, 3); 0 where a point is kept
+    together: Array  # 1 for a ball, (3, 3); the identity for a box
 
     def points(self, u: Array) -> Array:
         """Return points, ENU, (n, 3), of unbounded variables, (n, 3)."""

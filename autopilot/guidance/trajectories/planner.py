@@ -14,8 +14,7 @@ from colibri.common.types import Array
 
 _VERTICAL_SPEED_DECIMALS = 8
 _SNAP, _YAW_ACCELERATION = 4, 2
-_STILL = 1e-3
-"""Speed in m/s (likewise for higher derivatives) below which the direction is undefined."""
+_STILL = 1e-3  # speed in m/s (likewise for higher derivatives) below which the direction is undefined
 _BLOCK_SAMPLES = 512
 _START = Preview(interval_us=100_000, samples=1)
 
@@ -24,9 +23,7 @@ class Planner:
     """References along a track, then its last point; endless tracks are tabulated in blocks."""
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
-        self.preview = preview
-        self._track = track
-        self._references = references
+        self.preview, self._track, self._references = preview, track, references
         self._rest = _rest(track, preview.interval_us)
         self._length = _BLOCK_SAMPLES if self._rest is None else self._rest + 1
         self._block = 0
@@ -93,8 +90,7 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
     else:
         yaw = track.yaw(track.clock(t, _YAW_ACCELERATION))
         looks = [yaw.derivative(order) for order in range(_YAW_ACCELERATION + 1)]
-    columns = derivatives + looks
-    return Horizon(*columns)
+    return Horizon(*derivatives, *looks)
 
 
 def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:

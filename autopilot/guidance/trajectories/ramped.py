@@ -51,7 +51,6 @@ SHAPES: Mapping[Curve, Shape] = {
 
 
 def duration_s(speed: float, acceleration: float) -> float:
-    """Return the duration from rest to rest."""
     return 2.0 * speed / acceleration + _EDGE_S + 0.5 * _TURN_S
 
 

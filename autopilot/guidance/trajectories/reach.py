@@ -21,20 +21,14 @@ from colibri.common.matrices import inverse
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-INTERVAL_S = 0.01
-"""Sampling of a track."""
-
+INTERVAL_S = 0.01  # of the samples of a track
 _SNAP = 4
-_MAX_TILT_DEG = 80.0
-"""For control laws without a tilt limit: beyond, the vertical thrust is too small."""
+_MAX_TILT_DEG = 80.0  # for control laws without a tilt limit: beyond, the vertical thrust is too small
 _SMALL_N = 1e-3
-_LEAST_THRUST = 0.05
-"""Part of the weight: for less thrust, the turn rate is meaningless."""
-_CHARGE_SAMPLES = 10
-"""Step of the charge integration, in multiples of `INTERVAL_S`."""
+_LEAST_THRUST = 0.05  # part of the weight: for less thrust, the turn rate is meaningless
+_CHARGE_SAMPLES = 10  # step of the charge integration, in multiples of `INTERVAL_S`
 _REFINEMENTS = 3
-_RESPONSE_SAMPLES = 20
-"""Control laws return to the reference within about 0.2 s."""
+_RESPONSE_SAMPLES = 20  # control laws return to the reference within about 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +79,9 @@ class _Pulled(NamedTuple):
 
 
 class Reach:
-    """The limits of one vehicle under one profile."""
+    """The limits of one vehicle under one profile; `exact_drag` is for the actual thrust and tilt instead of hover."""
 
     def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
-        """`exact_drag` uses actual thrust and tilt instead of hover's; beyond 10 m/s they differ by newtons."""
         self._exact_drag = exact_drag
         self._vehicle = vehicle
         self._airframe = airframe_of(vehicle)

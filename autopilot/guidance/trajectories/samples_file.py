@@ -15,11 +15,9 @@ from colibri.common.types import Array
 _PLACE, _VELOCITY, _ACCELERATION = ("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az")
 _REQUIRED = ("t", *_PLACE)
 _OPTIONAL = (*_VELOCITY, *_ACCELERATION, "yaw")
-_SMOOTHED_S = 0.5
-"""Time span of the samples that a derivative follows from."""
+_SMOOTHED_S = 0.5  # time span of the samples that a derivative follows from
 _MIN_STEP_S = 1e-3
-_TOLERANCE = 0.1
-"""Allowed contradiction between columns, relative to the change between rows."""
+_TOLERANCE = 0.1  # allowed contradiction between columns, relative to the change between rows
 _LEAST_SMOOTHED = 7
 _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
 _PEAK = 10.0 / 3.0**0.5
@@ -32,12 +30,7 @@ _FORMS = {
 }
 _ALIASES = {
     **dict.fromkeys(("time", "time_s", "t_s", "timestamp", "seconds"), ("t", 1.0)),
-    **{
-        form.format(axis): (name.format(axis), 1.0)
-        for name, forms in _FORMS.items()
-        for form in forms
-        for axis in _PLACE
-    },
+    **{form.format(xyz): (name.format(xyz), 1.0) for name, forms in _FORMS.items() for form in forms for xyz in _PLACE},
     **dict.fromkeys(("yaw_deg", "heading_deg", "psi_deg"), ("yaw", 1.0)),
     **dict.fromkeys(("yaw_rad", "psi", "psi_rad"), ("yaw", degrees(1.0))),
 }
@@ -46,23 +39,18 @@ _ALIASES = {
 
 @dataclass(frozen=True, slots=True)
 class SampledTrack:
-    """Times from 0, s, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped, or along the path.
-
-    Attributes:
-        note: What was derived, for the user.
-    """
+    """Times from 0, s, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped, or along the path."""
 
     times_s: Array
     motion_enu: Array
     yaw_rad: Array | None
-    note: str = ""
+    note: str = ""  # what was derived, for the user
 
 
 def read_samples(path: Path, text: str | None = None) -> SampledTrack:
     """Read columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and yaw (degrees), or raise TrackFileError.
 
-    Common other names of columns are known. Without accelerations, velocities and accelerations follow from smoothed
-    positions.
+    Without accelerations, velocities and accelerations follow from smoothed positions.
     """
     table = read_table(path, _REQUIRED, _OPTIONAL, text, _ALIASES)
     times_s = table.times(_MIN_STEP_S)
@@ -97,7 +85,7 @@ def columns_of(times_s: Array, motion: Mapping[str, Array]) -> str:
 
 
 def _roughness(table: CsvTable, steps_s: Array, motion: Array) -> str:
-    """Say what rounding does: positions off by δ make accelerations of up to 5.8 δ / h² between rows h apart."""
+    """Describe rounding: positions off by δ make accelerations of up to 5.8 δ / h² between rows h apart."""
     x, v, a = np.moveaxis(motion, 1, 0)
     off = np.diff(x, axis=0) - 0.5 * steps_s * (v[:-1] + v[1:]) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     rough = _PEAK * np.abs(off).max(axis=1) / (steps_s * steps_s)[:, 0]

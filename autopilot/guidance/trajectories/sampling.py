@@ -18,12 +18,10 @@ from colibri.autopilot.spec import Trajectory
 from colibri.common.types import Array
 
 _STEP_S, _MAX_SAMPLES = 0.02, 20_000
-_BEYOND_S = 2.0
-"""Sampled beyond the end of a flight, as its control law looks ahead."""
+_BEYOND_S = 2.0  # sampled beyond the end of a flight, as its control law looks ahead
 _NEIGHBOURS = 7
 _NAMES = ("position", "velocity", "acceleration", "yaw")
-_OTHERS = {"position": "x", "velocity": "x_dot", "acceleration": "x_ddot"}
-"""The names of RotorPy."""
+_OTHERS = {"position": "x", "velocity": "x_dot", "acceleration": "x_ddot"}  # the names of RotorPy
 _EXPECTED = (
     "expected a function of time that returns x, y, z (m, ENU), or position, velocity and acceleration; "
     "or an object with such a function position, and velocity, acceleration and yaw (rad) if it has them"

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from colibri.autopilot.guidance.trajectories.ramped import SHAPES, Curve, arc, duration_s
 from colibri.autopilot.guidance.trajectories.samples_file import SampledTrack, read_samples
-from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, in_series, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
 from colibri.common.types import Array
 
-Place: TypeAlias = tuple[TaylorSeries, TaylorSeries, TaylorSeries]
-"""x, y, z in m, ENU."""
+Place: TypeAlias = tuple[TaylorSeries, TaylorSeries, TaylorSeries]  # x, y, z in m, ENU
 Length: TypeAlias = Annotated[float, msgspec.Meta(ge=0.01, le=1000.0)]
 Coordinate: TypeAlias = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
 Speed: TypeAlias = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
@@ -28,12 +27,8 @@ YawChoice: TypeAlias = Literal["path", "fixed"]
 
 DURATION_S = 100.0
 
-_RADIUS_M = 2.0
-_TURNS_PER_S = 0.025
-_CLIMB_M_S = 0.03
-_START_HEIGHT_M = 2.0
-_INSTANT_S = 1e-9
-"""Tolerance of rounding: times are whole microseconds."""
+_RADIUS_M, _TURNS_PER_S, _CLIMB_M_S, _START_HEIGHT_M = 2.0, 0.025, 0.03, 2.0
+_INSTANT_S = 1e-9  # tolerance of rounding: times are whole microseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +122,8 @@ class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True)
     yaw: Angle = 0.0
 
     def track(self) -> Track:
-        return Track(lambda t: (held(t, self.x), held(t, self.y), held(t, self.height)), self._yaw, inf)
-
-    def _yaw(self, t: TaylorSeries) -> TaylorSeries:
-        return held(t, radians(self.yaw))
+        place = in_series(lambda _: (self.x, self.y, self.height))
+        return Track(place, in_series(lambda _: radians(self.yaw)), inf)
 
 
 class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):

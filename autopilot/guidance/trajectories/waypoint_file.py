@@ -11,8 +11,7 @@ from colibri.autopilot.guidance.trajectories.openings import Openings
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
-MARGIN = 0.1
-"""Part of each range reserved for the control law, also against wind."""
+MARGIN = 0.1  # part of each range reserved for the control law, also against wind
 MIN_LEG_S = 0.05
 
 _REQUIRED = ("x", "y", "z")
@@ -21,30 +20,20 @@ _OPTIONAL = ("t", "yaw", *(_WINDOW := ("width", "height", "facing")))
 
 @dataclass(frozen=True, slots=True)
 class Waypoints:
-    """Points, ENU, (n, 3), with times, (n,), and yaw, unwrapped, or along the path.
-
-    Attributes:
-        timed: Whether the file prescribes the times.
-        margin: Part of each range reserved for the control law.
-        openings: What is flown through at the points, with `fastest`.
-        facing: Directions in which windows are flown through, ENU, (n, 3); 0 where there is none.
-    """
+    """Points, ENU, (n, 3), with times, (n,), and yaw, unwrapped, or along the path."""
 
     path: Path
     times_s: Array
     points_enu_m: Array
     yaw_rad: Array | None
-    timed: bool
+    timed: bool  # the file prescribes the times
     fastest: bool = False
     margin: float = MARGIN
-    openings: Openings | None = None
-    facing: Array | None = None
+    openings: Openings | None = None  # what is flown through at the points, with `fastest`
+    facing: Array | None = None  # directions through windows, ENU, (n, 3); 0 without one
 
     def stretched(self, factors: Array) -> "Waypoints":
-        return self.at(np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
-
-    def at(self, times_s: Array) -> "Waypoints":
-        return replace(self, times_s=times_s)
+        return replace(self, times_s=np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
 
     def leg_at(self, t: float) -> int:
         return int(np.searchsorted(self.times_s[1:-1], t, side="right"))

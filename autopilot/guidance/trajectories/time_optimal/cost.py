@@ -1,7 +1,7 @@
 """Duration of a flight plus penalty on exceeded limits, with its gradient.
 
-Source: Z. Wang, X. Zhou, C. Xu and F. Gao, "Geometrically constrained trajectory optimization for multicopters", IEEE
-Transactions on Robotics 38 (2022). Demands are differentiated numerically, so that their formulas stay in `reach`.
+Source: Z. Wang, X. Zhou, C. Xu and F. Gao, IEEE Transactions on Robotics 38 (2022). Demands are differentiated
+numerically, so that their formulas stay in `reach`.
 """
 
 from math import factorial, inf
@@ -22,24 +22,19 @@ from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
 
-_INTERVALS = 8
-"""Sampling intervals of a piece."""
-_STEPS = (1e-6, 1e-6, 1e-5, 1e-4)
-"""Difference steps of velocity, acceleration, jerk and snap."""
+_INTERVALS = 8  # samples of a piece
+_STEPS = (1e-6, 1e-6, 1e-5, 1e-4)  # difference steps of velocity, acceleration, jerk and snap
 _ORDERS = np.tile(np.arange(float(SNAP)), 2)
 
 
 class FlightCost:
-    """Cost as a function of leg times and free points.
+    """Cost as a function of leg times and free points, of which each leg has `pieces`.
 
-    Attributes:
-        weight: Of squared excess in parts of its range (m below the floor), integrated over time.
-        charge_ah: Taken before.
-        tightened: Part of each demand's range, (demands,), reserved beyond the margin.
+    `weight` is of the squared excess in parts of its range (m below the floor), integrated over time; `charge_ah` was
+    taken before; `tightened` is the part of each demand's range, (demands,), reserved beyond the margin.
     """
 
     def __init__(self, reach: Reach, waypoints: Waypoints, pieces: int) -> None:
-        """Each leg has `pieces`; the margin of each range is reserved for the control law."""
         self.weight, self.charge_ah, self.floor_m, self.tightened = 0.0, 0.0, -inf, np.zeros(1)
         self._reach, self._pieces = reach, pieces
         self._given, self._margin, self._openings = waypoints.points_enu_m, waypoints.margin, waypoints.openings

@@ -18,18 +18,13 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position, thro
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array
 
-_PIECES, _LEAST_PIECES, _MOST_PIECES = 8, 32, 1024
-"""Pieces of a leg, and bounds on the pieces of all legs."""
-_WEIGHTS = (1e2, 1e4)
-"""Successive weights of the penalty."""
+_PIECES, _LEAST_PIECES, _MOST_PIECES = 8, 32, 1024  # of a leg, and bounds on those of all legs
+_WEIGHTS = (1e2, 1e4)  # successive weights of the penalty
 _ITERATIONS = 250
-_TOLERANCE, _ROUGH_TOLERANCE = 2e-5, 1e-4
-"""Of the last stage, and before."""
-_CLEARANCE_M = 0.01
-"""Above the floor; increased by dips found."""
+_TOLERANCE, _ROUGH_TOLERANCE = 2e-5, 1e-4  # of the last stage, and before
+_CLEARANCE_M = 0.01  # above the floor; increased by dips found
 _LIFTS, _TIGHTENINGS = 10, 4
-_SLOWER = (0.0005, 0.05)
-"""Bounds of the slow-down in one pass."""
+_SLOWER = (0.0005, 0.05)  # bounds of the slow-down in one pass
 
 
 def fastest(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:

@@ -1,7 +1,7 @@
-"""Minimisation by limited-memory BFGS.
+"""Minimisation by limited-memory BFGS, as SciPy's sums depend on the CPU.
 
 J. Nocedal and S. J. Wright, "Numerical Optimization" (2006), algorithm 7.4; line search: A. S. Lewis and M. L. Overton,
-"Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6. SciPy's sums depend on the CPU.
+"Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6.
 """
 
 from collections import deque
@@ -12,14 +12,11 @@ from typing import NamedTuple, TypeAlias
 from colibri.common.matrices import dot, norm
 from colibri.common.types import Array
 
-Function: TypeAlias = Callable[[Array], tuple[float, Array]]
-"""x (n,) -> value and gradient (n,)."""
+Function: TypeAlias = Callable[[Array], tuple[float, Array]]  # x (n,) -> value and gradient (n,)
 
-_MEMORY, _WINDOW = 50, 20
-"""Pairs of steps, and values compared for a stop."""
+_MEMORY, _WINDOW = 50, 20  # pairs of steps, and values compared for a stop
 _TRIALS = 30
-_DECREASE, _CURVATURE = 1e-4, 0.9
-"""Weak Wolfe conditions."""
+_DECREASE, _CURVATURE = 1e-4, 0.9  # weak Wolfe conditions
 
 
 class _Point(NamedTuple):
