@@ -92,10 +92,12 @@ class WorldSpec:
 
     @property
     def weather(self) -> Weather:
+        """Wind, gusts and turbulence."""
         return Weather(self.wind, self.gusts, self.turbulence, self.seed)
 
     @property
     def disturbance(self) -> Noise | None:
+        """The plant's noise, if any."""
         return Noise(self.noise, self.seed) if any(self.noise.values()) else None
 
     def started(self, usual: Start) -> Start:
@@ -144,4 +146,5 @@ class PlantSpec(WorldSpec, ProcessSpec):
 
     @property
     def pace(self) -> float:
+        """Speed, times real time."""
         return self.speed or (1.0 if self.realtime else inf)
