@@ -26,7 +26,7 @@ from collections.abc import Hashable
 from typing import NamedTuple, TypeAlias, TypeVar
 
 from colibri.mavlink.client.conversation import Conversation
-from colibri.mavlink.node.router import target_of
+from colibri.mavlink.node.router import concerns, target_of
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, AUTOPILOT_INVALID, STATE_ACTIVE, Codec, Message, mav
 from colibri.mavlink.wire.signing import Signing
 
@@ -181,13 +181,9 @@ class Client:
     def _converse(self, message: Message, now_us: int) -> None:
         for conversation in [lane[0] for lane in self._lanes.values()]:
             answers = message.name in conversation.answers and message.source == conversation.target
-            if answers and self._is_addressed(message):
+            if answers and concerns(self.source, target_of(message.fields)):
                 conversation.receive(message, now_us)
                 self._retire(conversation)
-
-    def _is_addressed(self, message: Message) -> bool:
-        target = target_of(message.fields)
-        return all(wanted in (0, own) for wanted, own in zip(target, self.source, strict=True))
 
     def _retire(self, conversation: Conversation) -> None:
         if conversation.result is not None:

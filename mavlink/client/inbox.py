@@ -53,11 +53,7 @@ class Inbox:
             del kept[: self._remembers // 2]
         if name == "COMMAND_ACK":
             self.acks.append(fields)
-        elif name == "STATUSTEXT":
-            self._add_text(fields)
-
-    def _add_text(self, fields: Any) -> None:
-        if fields.chunk_seq and self.texts:
+        elif name == "STATUSTEXT" and fields.chunk_seq and self.texts:
             self.texts[-1] += fields.text
-        else:
+        elif name == "STATUSTEXT":
             self.texts.append(fields.text)

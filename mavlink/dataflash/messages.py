@@ -80,10 +80,6 @@ def _text(value: Value) -> bytes:
     return str(value).encode(errors="replace")
 
 
-def _single(value: Value) -> float:
-    return max(min(float(value), FLOAT32_MAX), -FLOAT32_MAX)  # nan stays
-
-
 def _whole(low: int, high: int, factor: float) -> Callable[[Value], int]:
     def convert(value: Value) -> int:
         scaled = factor * float(value)
@@ -99,7 +95,7 @@ def _integer(code: str, factor: float = 1.0) -> tuple[str, Callable[[Value], int
 
 
 _FIELDS: dict[str, tuple[str, Callable[[Value], int | float | bytes]]] = {
-    "f": ("f", _single),
+    "f": ("f", lambda value: max(min(float(value), FLOAT32_MAX), -FLOAT32_MAX)),  # nan stays
     "d": ("d", float),
     "n": ("4s", _text),
     "N": ("16s", _text),

@@ -1,10 +1,11 @@
 """A channel: one remote address on one link."""
 
 from colibri.common.types import Address
-from colibri.mavlink.node.router import SOURCES, Source
+from colibri.mavlink.node.router import Source
 from colibri.mavlink.wire.dialect import Codec, Message, sequence_of
 
 DATAGRAM_BYTES = 1400  # fits a datagram on common networks
+SOURCES = 64  # limit of those remembered per channel; the oldest is forgotten
 _SEQUENCES = 256
 
 

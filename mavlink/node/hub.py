@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 from colibri.common.types import Address
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.channel import Channel
-from colibri.mavlink.node.router import Router, target_of
+from colibri.mavlink.node.router import Source, concerns, onward, target_of
 from colibri.mavlink.node.service import IDLE, Peer, PolledService, Send, Service
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import TOO_EARLY, Signing
@@ -79,7 +79,7 @@ class Hub:
         self._receivers = {name: [service for service in services if name in service.handles] for name in names}
         self._signing = signing
         self._observers = tuple(observers)
-        self._router = Router(self._own)
+        self._sources: dict[int, dict[Source, int]] = {}  # received on each channel
         self._strangers = Codec(*self._own, keep_unknown=True)
         self._channels: dict[int, Channel] = {}
         self._numbers: dict[tuple[int, Address | None], int] = {}
@@ -154,10 +154,16 @@ class Hub:
                     self._idle.add(service)
                     self._choose()
             except Exception as error:
-                self._drop(service, error)
+                self._raised[service] += 1
+                self._tell(service, error, "tried again, then off")
+                if self._raised[service] >= _TRIES:
+                    self._polled = tuple(each for each in self._polled if each is not service)
+                    self._choose()
         if now_us >= self._tidy_at_us:
             self._tidy_at_us = now_us + _TIDY_EVERY_US
-            self._forget_silent()
+            for channel in self.channels:
+                if not channel.fixed and now_us - channel.active_us > FORGET_AFTER_US:
+                    self._forget(channel.number)
 
     def send(self, sends: Iterable[Send]) -> int:
         """Send messages; return how many were encoded."""
@@ -174,11 +180,8 @@ class Hub:
         return sent
 
     def take_outbox(self) -> list[Outgoing]:
-        return [
-            Outgoing(channel.link, channel.address, datagram)
-            for channel in self._channels.values()
-            for datagram in channel.take()
-        ]
+        channels = self._channels.values()
+        return [Outgoing(each.link, each.address, datagram) for each in channels for datagram in each.take()]
 
     def _refusal(self, message: Message, *, known: bool) -> str | None:
         if message.source == self._own:
@@ -197,13 +200,12 @@ class Hub:
             self._forward(message, (0, 0), channel)
             return
         channel.receive(message, self._now_us)
-        self._router.receive(message.source, channel.number)
         target = target_of(message.fields)
         if message.name == "SETUP_SIGNING":  # "must never be automatically forwarded", message_signing.html
             self._set_up_signing(message, target, channel, owner)
             return
         self._forward(message, target, channel)
-        if self._router.concerns_us(target) and message.name in self._receivers:
+        if concerns(self._own, target) and message.name in self._receivers:
             self._queue(message, channel)
 
     def _queue(self, message: Message, channel: Channel) -> None:
@@ -234,30 +236,22 @@ class Hub:
     def _choose(self) -> None:
         self._awake = tuple(service for service in self._polled if service not in self._idle)
 
-    def _drop(self, service: Service, error: Exception) -> None:
-        self._raised[service] += 1
-        self._tell(service, error, "tried again, then off")
-        if self._raised[service] >= _TRIES:
-            self._polled = tuple(each for each in self._polled if each is not service)
-            self._choose()
-
     def _tell(self, service: Service, error: Exception, instead: str) -> None:
         if self._caught is None:
             raise error
         self._caught(type(service).__name__, error, instead)
 
     def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:
-        for number in self._router.onward(message.source, target, channel.number):
+        for number in onward(self._sources, message.source, target, channel.number):
             self._channels[number].say(message.frame)
 
     def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, owner: bool) -> None:
         fields, signing = message.fields, self._signing
-        addressed = target[0] == self._own[0] and self._router.concerns_us(target)
+        addressed = target[0] == self._own[0] and concerns(self._own, target)
         if addressed and not owner:
             self._warn_of(KEY_REFUSED)
-        if not (signing and owner and addressed) or not signing.set_up(
-            bytes(fields.secret_key), fields.initial_timestamp
-        ):
+        key = bytes(fields.secret_key)
+        if not (signing and owner and addressed and signing.set_up(key, fields.initial_timestamp)):
             channel.codec.dropped["signing not set up"] += 1
             return
         for each in self._channels.values():
@@ -291,7 +285,7 @@ class Hub:
         self._next_number += 1
         self._channels[channel.number] = channel
         self._numbers[link, address] = channel.number
-        self._router.open(channel.number)
+        self._sources[channel.number] = channel.sources_us
         self._seal(channel)
         for observer in self._observers:
             observer.opened(channel.number, self._now_us)
@@ -301,12 +295,7 @@ class Hub:
         channel = self._channels.pop(number)
         self.waiting.pop(number, None)
         del self._numbers[channel.link, channel.address]
-        self._router.close(number)
+        del self._sources[number]
         self._dropped_before += channel.codec.dropped
         for observer in self._observers:
             observer.closed(number)
-
-    def _forget_silent(self) -> None:
-        for channel in list(self._channels.values()):
-            if not channel.fixed and self._now_us - channel.active_us > FORGET_AFTER_US:
-                self._forget(channel.number)

@@ -4,52 +4,27 @@ A broadcast goes to every channel, a message with a target to channels that have
 channel that has received its source. So messages cannot circulate.
 """
 
+from collections.abc import Collection, Mapping
+
 Source = tuple[int, int]  # system and component id
 
-SOURCES = 64  # limit of sources remembered per channel; the oldest is forgotten
+
+def onward(received: Mapping[int, Collection[Source]], source: Source, target: Source, channel: int) -> list[int]:
+    """Return the channels to forward a message to, by the sources that each has received."""
+    return [
+        other
+        for other, sources in received.items()
+        if other != channel and source not in sources and (not target[0] or _leads_to(target, sources))
+    ]
 
 
-class Router:
-    """Table of the sources received on each channel."""
-
-    def __init__(self, own: Source) -> None:
-        self._own = own
-        self._sources: dict[int, dict[Source, None]] = {}
-
-    def open(self, channel: int) -> None:
-        self._sources[channel] = {}
-
-    def close(self, channel: int) -> None:
-        self._sources.pop(channel, None)
-
-    def receive(self, source: Source, channel: int) -> None:
-        sources = self._sources[channel]
-        if source in sources:
-            return
-        if len(sources) == SOURCES:
-            del sources[next(iter(sources))]
-        sources[source] = None
-
-    def onward(self, source: Source, target: Source, channel: int) -> list[int]:
-        """Return the channels to forward a message to; target ids of 0 mean all."""
-        if target == self._own:
-            return []
-        return [
-            other
-            for other, sources in self._sources.items()
-            if other != channel and source not in sources and (not target[0] or _leads_to(target, sources))
-        ]
-
-    def concerns_us(self, target: Source) -> bool:
-        system, component = target
-        return system in (0, self._own[0]) and component in (0, self._own[1])
+def concerns(own: Source, target: Source) -> bool:
+    return target[0] in (0, own[0]) and target[1] in (0, own[1])
 
 
-def _leads_to(target: Source, sources: dict[Source, None]) -> bool:
+def _leads_to(target: Source, sources: Collection[Source]) -> bool:
     system, component = target
-    if component:
-        return target in sources
-    return any(system == other for other, _ in sources)
+    return target in sources if component else any(system == other for other, _ in sources)
 
 
 def target_of(fields: object) -> Source:

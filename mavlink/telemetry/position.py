@@ -20,8 +20,10 @@ PERCENT = 100
 def global_position_int(s: TelemetrySnapshot) -> Fields:
     """GLOBAL_POSITION_INT (33): degE7, mm, cm/s NED, centidegrees."""
     place = s.place
+    _, _, yaw = euler_from_quaternion(s.attitude)
+    heading = compass_cdeg(yaw) if isfinite(yaw) else UNKNOWN_U16
     altitudes_mm = (1e3 * place.altitude_m, 1e3 * s.height_above_home_m)
-    return (s.boot_ms, *degrees_e7(place), *altitudes_mm, *s.velocity_ned_cm_s, heading_cdeg(s))
+    return (s.boot_ms, *degrees_e7(place), *altitudes_mm, *s.velocity_ned_cm_s, heading)
 
 
 def local_position_ned(s: TelemetrySnapshot) -> Fields:
@@ -91,8 +93,3 @@ def wind_cov(s: TelemetrySnapshot) -> Fields | None:
         return None
     altitude_m = s.position_enu_m[2] + s.origin.altitude_m
     return (s.time_us, *ned_from_enu(s.wind_enu_m_s), nan, nan, altitude_m, 0.0, 0.0)
-
-
-def heading_cdeg(s: TelemetrySnapshot) -> int:
-    _, _, yaw = euler_from_quaternion(s.attitude)
-    return compass_cdeg(yaw) if isfinite(yaw) else UNKNOWN_U16

@@ -24,32 +24,25 @@ SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))
 """Mark for readers after unreadable bytes."""
 
 
-def header(start_us: int = 0) -> bytes:
-    return MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
+def header() -> bytes:
+    return MAGIC + bytes([_VERSION]) + bytes(8) + message("B", bytes(8 + 8 + 3 * 8))
 
 
 def format_of(name: str, fields: str) -> bytes:
     return message("F", f"{name}:{fields}".encode())
 
 
-def information(facts: Mapping[str, str | int]) -> bytes:
-    return b"".join(_information(name, fact) for name, fact in facts.items())
-
-
-def _information(name: str, fact: str | int) -> bytes:
-    if isinstance(fact, int):
-        return _keyed("I", f"uint32_t {name}", fact.to_bytes(4, "little"))
-    text = fact.encode()
-    return _keyed("I", f"char[{len(text)}] {name}", text)
+def information(facts: Mapping[str, str]) -> bytes:
+    texts = {name: fact.encode() for name, fact in facts.items()}
+    return b"".join(_keyed("I", f"char[{len(text)}] {name}", text) for name, text in texts.items())
 
 
 def parameters(values: Mapping[str, int | float]) -> bytes:
-    return b"".join(_parameter(name, value) for name, value in values.items())
-
-
-def _parameter(name: str, value: int | float) -> bytes:
-    kind, layout = _TYPES[type(value)]
-    return _keyed("P", f"{kind} {name}", layout.pack(value))
+    encoded = b""
+    for name, value in values.items():
+        kind, layout = _TYPES[type(value)]
+        encoded += _keyed("P", f"{kind} {name}", layout.pack(value))
+    return encoded
 
 
 def _keyed(kind: str, key: str, value: bytes) -> bytes:

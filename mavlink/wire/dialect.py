@@ -264,12 +264,7 @@ def _header_bytes(frame: bytes) -> int:
     return HEADER_BYTES if frame[0] == MARKER else _HEADER_BYTES_V1
 
 
-def _slow_crc16(data: bytes, _start: int) -> int:
-    crc: int = mav.x25crc(data).crc
-    return crc
-
-
-crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc16
+crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or (lambda data, _start: mav.x25crc(data).crc)
 """pymavlink's compiled checksum without its wrapper object."""
 
 

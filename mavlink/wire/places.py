@@ -4,7 +4,6 @@ Latitude and longitude are given together or left out together; 0, 0 is invalid.
 MAV_FRAME_GLOBAL (and _INT), above home in every other frame: without a terrain map the ground is flat.
 """
 
-from collections.abc import Callable
 from math import hypot, isnan
 
 from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic, enu_of
@@ -62,7 +61,6 @@ def read_place(
     home_up_m: float,
     origin: Geodetic,
     here: Vector = (0.0, 0.0, 0.0),
-    enu: Callable[[Geodetic, Geodetic], Vector] = enu_of,
 ) -> Vector | Refusal:
     """Return a place in ENU, m; what is nan is that of `here`."""
     x, y, z = here
@@ -70,7 +68,7 @@ def read_place(
         wrong = misplaced(latitude_deg, longitude_deg)
         if wrong:
             return Refusal(wrong)
-        x, y, _ = enu(Geodetic(latitude_deg, longitude_deg, 0.0), origin)
+        x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, 0.0), origin)
     if not isnan(altitude_m):
         z = height_m(altitude_m, frame, home_up_m, origin)
     place = (x, y, z)

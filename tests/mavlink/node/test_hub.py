@@ -308,4 +308,4 @@ def test_a_flood_of_senders_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatc
         ours.receive(Station(2 + i % 200).says(), 0, ("127.0.0.1", i), i)
         ours.take_outbox()
     assert [channel.number for channel in ours.channels] == [0, 1, 499]  # who speaks is not pushed out
-    assert len(ours._numbers) == len(ours._router._sources) == 3  # noqa: SLF001
+    assert len(ours._numbers) == len(ours._sources) == 3  # noqa: SLF001
