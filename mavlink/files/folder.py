@@ -8,7 +8,7 @@ import os
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from errno import EACCES, EEXIST, EINVAL, EISDIR, ELOOP, ENAMETOOLONG, ENOENT, ENOSPC, ENOTDIR, ENOTEMPTY, EPERM, EROFS
+from errno import ELOOP, ENAMETOOLONG, EPERM, EROFS
 from functools import partial, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
@@ -21,14 +21,9 @@ _SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK  # follow no link; do not
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
 
 _REFUSALS = {
-    **dict.fromkeys((EACCES, ELOOP, EPERM, EROFS), FileRefusal.PROTECTED),
-    **dict.fromkeys((EINVAL, ENAMETOOLONG), FileRefusal.BAD_NAME),
-    EEXIST: FileRefusal.EXISTS,
-    EISDIR: FileRefusal.IS_FOLDER,
-    ENOENT: FileRefusal.NOT_FOUND,
-    ENOSPC: FileRefusal.NO_SPACE,
-    ENOTDIR: FileRefusal.NOT_A_FOLDER,
-    ENOTEMPTY: FileRefusal.NOT_EMPTY,
+    **{refusal.value: refusal for refusal in FileRefusal},
+    **dict.fromkeys((ELOOP, EPERM, EROFS), FileRefusal.PROTECTED),
+    ENAMETOOLONG: FileRefusal.BAD_NAME,
 }
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")

@@ -1,7 +1,6 @@
 """Wire format of the file transfer protocol: https://mavlink.io/en/services/ftp.html."""
 
 from enum import IntEnum
-from errno import EINVAL, EIO, EISDIR, ENOSPC, ENOTDIR, ENOTEMPTY
 from struct import Struct
 from typing import NamedTuple, TypeAlias
 
@@ -79,7 +78,7 @@ class Request(NamedTuple):
     def answer(self, outcome: "bytes | Nak | FileRefusal", *, last: bool = False) -> Send:
         opcode, peer = Opcode.ACK, self.peer
         if isinstance(outcome, FileRefusal):
-            outcome = _NAKS[outcome]
+            outcome = Nak(_ERRORS[outcome]) if outcome in _ERRORS else Nak(FtpError.FAIL_ERRNO, outcome.value)
         if isinstance(outcome, Nak):
             opcode = Opcode.NAK
             outcome = bytes(outcome) if outcome.errno else bytes(outcome[:1])
@@ -103,17 +102,12 @@ class Nak(NamedTuple):
     errno: int = 0
 
 
-_NAKS = {
-    FileRefusal.NOT_FOUND: Nak(FtpError.NOT_FOUND),
-    FileRefusal.EXISTS: Nak(FtpError.EXISTS),
-    FileRefusal.PROTECTED: Nak(FtpError.PROTECTED),
-    FileRefusal.NO_SPACE: Nak(FtpError.FAIL_ERRNO, ENOSPC),
-    FileRefusal.IS_FOLDER: Nak(FtpError.FAIL_ERRNO, EISDIR),
-    FileRefusal.NOT_A_FOLDER: Nak(FtpError.FAIL_ERRNO, ENOTDIR),
-    FileRefusal.NOT_EMPTY: Nak(FtpError.FAIL_ERRNO, ENOTEMPTY),
-    FileRefusal.BAD_NAME: Nak(FtpError.FAIL_ERRNO, EINVAL),
-    FileRefusal.FAILED: Nak(FtpError.FAIL_ERRNO, EIO),
+_ERRORS = {
+    FileRefusal.NOT_FOUND: FtpError.NOT_FOUND,
+    FileRefusal.EXISTS: FtpError.EXISTS,
+    FileRefusal.PROTECTED: FtpError.PROTECTED,
 }
+"""All other refusals are FAIL_ERRNO."""
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:

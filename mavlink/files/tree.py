@@ -5,6 +5,7 @@ Invalid names, offsets and data are refused; these classes never raise.
 
 from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
+from errno import EACCES, EEXIST, EINVAL, EIO, EISDIR, ENOENT, ENOSPC, ENOTDIR, ENOTEMPTY
 from typing import NamedTuple, Protocol, TypeAlias
 
 Names: TypeAlias = tuple[str, ...]  # a path: the names of the parent folders and its own. The root is ().
@@ -15,17 +16,17 @@ ENTRY_US = 4.0  # work to list an entry of a folder
 
 
 class FileRefusal(Enum):
-    """Reason why an operation was refused."""
+    """Reason why an operation was refused, as an errno."""
 
-    NOT_FOUND = "no such file or folder"
-    EXISTS = "exists already"
-    PROTECTED = "protected"
-    NO_SPACE = "no space left"
-    IS_FOLDER = "is a folder"
-    NOT_A_FOLDER = "is no folder"
-    NOT_EMPTY = "folder is not empty"
-    BAD_NAME = "no name for a file"
-    FAILED = "failed"
+    NOT_FOUND = ENOENT
+    EXISTS = EEXIST
+    PROTECTED = EACCES
+    NO_SPACE = ENOSPC
+    IS_FOLDER = EISDIR
+    NOT_A_FOLDER = ENOTDIR
+    NOT_EMPTY = ENOTEMPTY
+    BAD_NAME = EINVAL
+    FAILED = EIO
 
 
 class Entry(NamedTuple):
