@@ -12,8 +12,7 @@ from colibri.common.files import read_bytes
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
-UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)
-"""Raised for content that is not valid: `RecursionError` for nesting, a `ValueError` for text that is not UTF-8."""
+UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)  # nesting is a RecursionError
 T = TypeVar("T")
 _MOST = 1e12  # products of a few numbers up to there, and quotients, are finite
 

@@ -33,8 +33,7 @@ _HALF_SQRT2 = sqrt(0.5)
 _SINE = tuple((-1.0) ** k / factorial(2 * k + 1) for k in range(1, 9))  # of x^3, x^5 … x^17
 _COSINE = tuple((-1.0) ** k / factorial(2 * k) for k in range(2, 10))  # of x^4, x^6 … x^18
 _EXPONENTIAL = tuple(1.0 / factorial(k) for k in range(2, 14))  # of x^2, x^3 … x^13
-_LOGARITHM = tuple(2.0 / (2 * k + 1) for k in range(1, 11))
-"""Of s^2, s^4 … s^20 in log((1 + s) / (1 - s)) / s - 2."""
+_LOGARITHM = tuple(2.0 / (2 * k + 1) for k in range(1, 11))  # of s^2 … s^20 in log((1 + s) / (1 - s)) / s - 2
 _ARCTANGENT = tuple((-1.0) ** k / (2 * k + 1) for k in range(1, 6))  # of x^3, x^5 … x^11
 
 ATAN_STEPS = 16  # atan is tabulated at each sixteenth from 0 to 1

@@ -1,8 +1,4 @@
-"""Small dense matrices with a fixed order of operations: the same bits on every computer.
-
-BLAS and LAPACK choose their code by the CPU; at sizes of 3 to 100 they are not faster. Arguments must be writable
-float64; results are new and C-ordered.
-"""
+"""Small dense matrices with a fixed order of operations, unlike BLAS; arguments must be writable float64."""
 
 from math import sqrt
 

@@ -8,8 +8,7 @@ from pygeomag.wmm.wmm_2025 import WMM_2025
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 
-YEAR = 2026.0
-"""Fixed instead of the clock's, so that flights are repeatable; the model is valid from 2025 to 2030."""
+YEAR = 2026.0  # fixed, so that flights are repeatable; the model is valid from 2025 to 2030
 
 _GAUSS_PER_NT = 1e-5
 _DECIMALS_NT = 6

@@ -108,8 +108,7 @@ class _OnDisk(FunctionCache):
         return (*super()._index_key(sig, codegen), fields_of(sig))
 
 
-waiting: list[Callable[[], object]] = []
-"""Called before this process waits for another that compiles; what they raise ends the call instead."""
+waiting: list[Callable[[], object]] = []  # called before this process waits for another; may raise
 
 
 def _report_waiting() -> None:

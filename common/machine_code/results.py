@@ -1,7 +1,4 @@
-"""Compilation results on disk, loaded without numba's front end.
-
-numba itself imports its compiler and SciPy first, and parses code that only the compilation of a caller needs.
-"""
+"""Compilation results on disk, loaded without numba's front end, compiler and SciPy."""
 
 from collections.abc import Callable
 from functools import cache

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
-_handlers: dict[int, Any] = {}
-"""Handlers of the process, while its signals are held. Not a mask: other threads would still receive them."""
+_handlers: dict[int, Any] = {}  # of the process, while its signals are held; a mask would not hold other threads'
 _held: list[int] = []
 
 

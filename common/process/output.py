@@ -103,10 +103,7 @@ def text_output(output: Output, encoding: str = "utf-8") -> io.TextIOWrapper:
 
 
 def use_streams() -> None:
-    """Escape what the streams cannot encode; standard error waits for no reader.
-
-    Closed streams become the null device: else a later file would take their number.
-    """
+    """Escape what the streams cannot encode; standard error waits for no reader, closed streams are the null device."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), "r" if name == "stdin" else "w"))

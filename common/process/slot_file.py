@@ -1,8 +1,4 @@
-"""A file of two slots that survives a crash at any instant with the last complete write.
-
-Slots are written alternately, each by one call with number and checksum. A mapped file would be faster by 1 µs, and end
-the process where another program truncates it.
-"""
+"""A file of two slots, written in turn: it survives a crash at any instant with the last complete write."""
 
 import os
 from pathlib import Path

@@ -7,8 +7,7 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 from colibri.mavlink.wire.dialect import Message
 
 Target: TypeAlias = tuple[int, int]  # system and component id of a vehicle's autopilot
-Encoded: TypeAlias = tuple[str, tuple[Any, ...]]
-"""Name and fields of an outgoing message, in the order of its MAVLink definition, in wire units and frames."""
+Encoded: TypeAlias = tuple[str, tuple[Any, ...]]  # name and fields of an outgoing message
 
 OK = 0  # ACCEPTED or NO_ERROR: the same number in MAV_RESULT, MAV_MISSION_RESULT and MAV_PARAM_ERROR
 UNANSWERED = -1  # the result of a conversation without any answer

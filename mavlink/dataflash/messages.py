@@ -1,8 +1,4 @@
-"""The messages of a DataFlash log: https://ardupilot.org/dev/docs/logmessages.html.
-
-A message is two marks, its number and fields without gaps. The log itself defines messages (FMT), units and multipliers
-(FMTU, UNIT, MULT).
-"""
+"""The messages of a DataFlash log: https://ardupilot.org/dev/docs/logmessages.html."""
 
 from collections.abc import Callable, Sequence
 from struct import Struct

@@ -1,8 +1,4 @@
-"""Files in a folder on disk.
-
-Paths are walked name by name without following links, so files outside are unreachable. Only regular files and folders
-are shown.
-"""
+"""Files in a folder on disk, walked name by name without following links: files outside are unreachable."""
 
 import os
 import stat

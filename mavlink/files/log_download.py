@@ -1,8 +1,4 @@
-"""Flight logs: listed, downloaded and erased by LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122).
-
-Logs are the files of one folder by name; a log's id is its index in the client's last list, from 0 as in PX4 or from 1
-as in ArduPilot.
-"""
+"""Flight logs of a folder: LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122). Ids are indices in a client's last list."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -17,10 +13,7 @@ BLOCK_BYTES = 90
 MESSAGES_A_POLL = 20
 ERASED_A_POLL = 20
 MESSAGES_A_POLL_OF_A_LONG_PART = 8
-SHORT_BYTES = 256 * BLOCK_BYTES
-"""Fits any client's socket buffer: the most that MAVSDK and QGroundControl request at once. MAVProxy requests
-whole logs, faster than it can read.
-"""
+SHORT_BYTES = 256 * BLOCK_BYTES  # fits any client's socket buffer; MAVProxy requests whole logs
 MAX_TRANSFERS_OF_A_PEER = 32
 MAX_PEERS = 16
 LAST_ID = 0xFFFF

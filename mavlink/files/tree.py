@@ -1,7 +1,4 @@
-"""The vehicle's files as ground stations see them.
-
-Invalid names, offsets and data are refused; these classes never raise.
-"""
+"""The vehicle's files as ground stations see them. Invalid input is refused; these classes never raise."""
 
 from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
@@ -93,8 +90,7 @@ def reading_of(data: bytes) -> OpenFile:
     return OpenFile(len(data), lambda offset, count: data[offset : offset + count])
 
 
-Generator: TypeAlias = Callable[[str], bytes]
-"""Content of a file from its query, the text behind the name's question mark: "withdefaults=1"."""
+Generator: TypeAlias = Callable[[str], bytes]  # content by the query behind a question mark: "withdefaults=1"
 
 
 class Tree:

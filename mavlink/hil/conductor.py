@@ -1,8 +1,4 @@
-"""Step messages: all datagrams of stepped ground stations and a vehicle at one time.
-
-Stations' datagrams come with each frame of the plant, the vehicle's with its answer: so every datagram arrives at a
-definite frame.
-"""
+"""Step messages: all datagrams of stepped ground stations and a vehicle at one time, with the frame or its answer."""
 
 from collections.abc import Sequence
 from struct import Struct

@@ -27,8 +27,7 @@ from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
 RESEND_AFTER_S = 0.02  # wall-clock silence before the plant repeats its frame
-PEER_LOST_AFTER_S = 0.5
-"""Wall-clock silence before another autopilot may take over, if the address of the first is free again."""
+PEER_LOST_AFTER_S = 0.5  # wall-clock silence before another may take over, if the first one's address is free
 PEER_GIVEN_UP_AFTER_S = 10.0  # wall-clock silence before another may take over in any case
 CALL_AFTER_S = 1.0  # wall-clock silence before the autopilot calls again, and a new flight may begin
 CALL_EVERY_S = 0.05

@@ -19,8 +19,7 @@ from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
 from colibri.mavlink.hil.world_changes import WorldChange
 
 CALL_EVERY_S = 0.5  # wall-clock interval of HEARTBEAT
-ANSWER_AGAIN_AFTER_S = 1.0
-"""Wall-clock silence before the last answer is repeated: a datagram may have been lost."""
+ANSWER_AGAIN_AFTER_S = 1.0  # wall-clock silence before the last answer is repeated
 
 _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER | Updated.BAROMETER
 

@@ -22,11 +22,9 @@ from colibri.mavlink.wire.dialect import Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
-RESEND_AFTER_S = 1.0
-"""Wall-clock silence before a frame is repeated: PX4 may have restarted, or a datagram been lost."""
+RESEND_AFTER_S = 1.0  # wall-clock silence before a frame is repeated, as PX4 may have restarted
 CALL_EVERY_S = 0.5
-GIVEN_UP_AFTER_S = 30.0
-"""Wall-clock time without an answer after which another caller takes over: PX4 needs some seconds to start."""
+GIVEN_UP_AFTER_S = 30.0  # wall-clock silence before another caller takes over: PX4 starts slowly
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _G_M_S2 = 9.80665

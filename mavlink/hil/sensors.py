@@ -1,8 +1,7 @@
 """Sensor frames from plant to autopilot, in SI, ENU/FLU, and their messages of PX4's simulator interface.
 
-HIL_SENSOR has the on-board measurements, HIL_GPS its own rate and delay; further sensors are rows of `OWN_MESSAGES`.
 Units and frames: https://docs.px4.io/main/en/simulation/. Values are unchecked: an autopilot must cope with broken
-sensors.
+ones.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,8 +28,7 @@ _FIELDS = (
     "abs_pressure diff_pressure pressure_alt temperature fields_updated"
 )
 _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
-_SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]
-"""With one and two non-zero bytes of `fields_updated`."""
+_SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]  # without zero bytes
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *_SHORTENED)}
 _SINGLES = Struct("<11f")
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")

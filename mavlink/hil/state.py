@@ -1,7 +1,4 @@
-"""State frames and commands between plant and autopilot, in SI, ENU/FLU, and their MAVLink messages.
-
-Invalid input decodes to `None`.
-"""
+"""State frames and commands between plant and autopilot, in SI, ENU/FLU, and as MAVLink; invalid input is `None`."""
 
 from array import array
 from collections.abc import Iterable, Sequence
@@ -23,8 +20,7 @@ _SINGLES = Struct("<13f")
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
 STATE_MESSAGES = 2
-STATE_BYTES = _ATTITUDE.size + _POSITION.size
-"""Size of a datagram that is nothing but a frame of state feedback."""
+STATE_BYTES = _ATTITUDE.size + _POSITION.size  # of a datagram of state feedback alone
 _DISARMED = MODE_CUSTOM | MODE_HIL
 _ARMED = _DISARMED | MODE_ARMED
 

@@ -8,12 +8,7 @@ from typing import Protocol
 from colibri.common.types import Address
 from colibri.mavlink.errors import MavlinkError
 
-SPIN_S = 1e-3
-"""How long to poll for a datagram before sleeping: on loopback a wake-up costs more than the exchange.
-
-Only if the previous wait was as short: a flight at wall-clock pace sleeps between its frames. Each poll yields the
-core, perhaps to the very process that is awaited.
-"""
+SPIN_S = 1e-3  # polled for so long before sleeping, if the previous wait was as short: a wake-up costs more
 give_way = getattr(os, "sched_yield", lambda: None)
 
 

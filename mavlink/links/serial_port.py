@@ -1,8 +1,4 @@
-"""A serial port as a non-blocking endpoint, reopened when its device returns.
-
-Beyond the line's speed, whole datagrams are dropped. pyserial only opens the port: its `write` blocks on a stalled
-device.
-"""
+"""A serial port as a non-blocking endpoint, reopened when its device returns; pyserial only opens it."""
 
 import errno
 import os

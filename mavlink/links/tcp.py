@@ -16,13 +16,10 @@ from colibri.mavlink.wire.framing import Framer
 OUTPUT_BYTES = 1 << 18  # send queue per connection beyond the system's; more is dropped
 CONNECTIONS = 16  # limit of a server's clients
 RECONNECT_AFTER_S = 1.0
-IDLE_AFTER_S = 3.5
-"""Silence after which a client gives way to another where there are too many; stations send a HEARTBEAT a second."""
+IDLE_AFTER_S = 3.5  # silence after which a client gives way to another; stations send a HEARTBEAT a second
 FIRST_BYTES = 4096
-NOTE_EVERY_S = 1.0
-"""Interval of the notes on refused connections: who floods a port must not flood the terminal."""
-ACCEPT_EVERY_S = 0.1
-"""Accept interval of a busy server with clients: each attempt is a system call, each client costs time."""
+NOTE_EVERY_S = 1.0  # of refused connections: a flood must not reach the terminal
+ACCEPT_EVERY_S = 0.1  # of a busy server with clients: each attempt is a system call
 _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16  # limit per call, so that a continuous sender cannot stall the process
 _HTTP = re.compile(

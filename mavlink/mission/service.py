@@ -28,8 +28,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
 NO_MISSION_TOTAL = 0xFFFF  # MISSION_CURRENT.total without a mission
-GUIDED = 2
-"""MISSION_ITEM.current of an immediate destination outside the mission, as DroneKit's simple_goto sends."""
+GUIDED = 2  # MISSION_ITEM.current of an immediate destination, as DroneKit's simple_goto sends
 FORGOTTEN_AFTER_US = 5_000_000  # silence after which a reader gets the newest plan
 MAX_READERS = 32
 _OF_A_PLAN = frozenset({"MISSION_COUNT", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_REQUEST"})
@@ -93,10 +92,7 @@ class MissionVehicle(NamedTuple):
 
 
 class MissionService:
-    """Holds the three plans and serves the mission protocol: one method per message.
-
-    With `MissionVehicle.home`, clients count a mission's items from 1, and item 0 is home.
-    """
+    """Holds the three plans and serves the mission protocol: one method per message."""
 
     def __init__(
         self,

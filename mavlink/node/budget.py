@@ -5,10 +5,7 @@ MAX_SAVED_US = 2_000.0
 
 
 class Budget:
-    """Work in µs, estimated: with measured times no flight would repeat bit by bit.
-
-    Work begins while anything is left; excess is earned before the next work begins.
-    """
+    """Work in µs, estimated: with measured times no flight would repeat bit by bit. Excess is earned afterwards."""
 
     def __init__(self) -> None:
         self._left_us = MAX_SAVED_US

@@ -10,8 +10,7 @@ from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkabl
 
 from colibri.mavlink.wire.dialect import Message
 
-Fields: TypeAlias = tuple[Any, ...]
-"""A message's fields in the order of its MAVLink definition, in wire units and frames."""
+Fields: TypeAlias = tuple[Any, ...]  # in the order of the MAVLink definition, in wire units and frames
 
 
 class Peer(NamedTuple):
@@ -35,8 +34,7 @@ class Send(NamedTuple):
     channel: int | None = None  # `None` for all
 
 
-IDLE: Final[Sequence[Send]] = []
-"""Result of an idle service, which is not polled again before it receives a message."""
+IDLE: Final[Sequence[Send]] = []  # of a service that is not polled again before it receives a message
 
 
 class Service(Protocol):

@@ -11,8 +11,7 @@ _HEADER = Struct("<HHH")  # magic, parameters in this file, parameters in all
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _TYPES = {ParamType.INT: 3, ParamType.REAL: 4}
 _HAS_DEFAULT = 0x10
-_NARROW = {mav.MAV_PARAM_TYPE_INT8: (1, "<b"), mav.MAV_PARAM_TYPE_INT16: (2, "<h")}
-"""Type number and layout of integers that are narrower than 32 bits."""
+_NARROW = {mav.MAV_PARAM_TYPE_INT8: (1, "<b"), mav.MAV_PARAM_TYPE_INT16: (2, "<h")}  # type, layout
 _MAX_COMMON_CHARS = 15
 
 

@@ -1,7 +1,4 @@
-"""The parameter microservice of the vehicle: https://mavlink.io/en/services/parameter.html.
-
-Values are encoded bytewise, as PX4's, or every number as a float, as ArduPilot's.
-"""
+"""The parameter microservice of the vehicle: https://mavlink.io/en/services/parameter.html."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -94,10 +94,7 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters sorted by name, and their values; `prepare` may refuse a change.
-
-    `initial` values replace defaults; `links` return what follows from a change.
-    """
+    """Parameters sorted by name, and their values; `prepare` may refuse a change, `links` return what follows."""
 
     def __init__(
         self,

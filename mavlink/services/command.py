@@ -18,11 +18,9 @@ FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 UNSUPPORTED_MAV_FRAME = 9  # MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects
 
-_SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}
-"""Others are warnings; of what is not supported ground stations ask by themselves."""
+_SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}  # of others: warnings; stations ask for unsupported ones by themselves
 
-PENDING = Refusal(result=-1)
-"""Result of a command that takes a few frames: its sender gets the answer with `finish`."""
+PENDING = Refusal(result=-1)  # takes a few frames: `finish` sends the answer
 
 PROGRESS_UNKNOWN = 0xFF  # COMMAND_ACK.progress of a pending command
 NOT_GIVEN = 2**31 - 1  # the integer x and y of a COMMAND_INT for nan in a COMMAND_LONG
@@ -33,8 +31,7 @@ GLOBAL_FRAMES = frozenset(bits("MAV_FRAME_", name + suffix) for name in _GLOBAL 
 """Frames with latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name ends
 in INT, as all clients send them.
 """
-PLACES: frozenset[int] = GLOBAL_FRAMES | {mav.MAV_FRAME_MISSION}
-"""Frames of a command with a place; MAV_FRAME_MISSION means without one."""
+PLACES: frozenset[int] = GLOBAL_FRAMES | {mav.MAV_FRAME_MISSION}  # the last means without one
 
 PROGRESS_EVERY_US = 1_000_000
 REMEMBERED_FOR_US = 10_000_000

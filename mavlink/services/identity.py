@@ -1,8 +1,4 @@
-"""The autopilot's identity: its conventions on the wire.
-
-Ground stations adapt to MAV_AUTOPILOT: for `px4` or `ardupilot` they offer all features, for `generic` common ones.
-AUTOPILOT_VERSION and a text at the start name Colibri.
-"""
+"""The autopilot's identity: its conventions on the wire, to which ground stations adapt."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias

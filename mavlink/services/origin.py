@@ -11,8 +11,7 @@ from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
 
-SET_MODE_ID = 11
-"""ArduPilot up to 4.5 acknowledges SET_MODE as a command of this number, and older scripts wait for it."""
+SET_MODE_ID = 11  # ArduPilot up to 4.5 acknowledges SET_MODE as this command
 
 
 class Setters(NamedTuple):

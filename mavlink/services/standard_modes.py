@@ -22,8 +22,7 @@ class ModeInfo(NamedTuple):
     advanced: bool = False  # "harder to fly"
 
 
-SetMode: TypeAlias = Callable[[int, ReceivedCommand], Refusal | None]
-"""Sets the given custom mode for a command."""
+SetMode: TypeAlias = Callable[[int, ReceivedCommand], Refusal | None]  # (custom mode, command)
 
 
 class StandardModes:

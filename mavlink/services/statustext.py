@@ -18,8 +18,7 @@ NOTICE: int = mav.MAV_SEVERITY_NOTICE
 INFO: int = mav.MAV_SEVERITY_INFO
 
 
-_WORDS = ("emergency", "alert", "critical", "error", "warning")
-"""Of severities from 0; higher ones need no prefix."""
+_WORDS = ("emergency", "alert", "critical", "error", "warning")  # of severities from 0
 
 
 class Line(NamedTuple):

@@ -17,8 +17,7 @@ POSITION_KNOWN = 1
 MAX_SPEED_M_S = 100.0
 MAX_ACCELERATION_M_S2 = 100.0
 SILENT_AFTER_US = 3_000_000  # trackers send a position once a second
-GOES_ON_US = 2_000_000
-"""Extrapolation at the last velocity without messages; then the target is assumed to stand."""
+GOES_ON_US = 2_000_000  # extrapolation at the last velocity; then the target is assumed to stand
 _DEG = 1e-7
 
 

@@ -34,8 +34,7 @@ MAX_YAW_RATE_RAD_S = 35.0  # of body rates: 2000 degrees a second, the range of 
 MAX_YAW_RAD = 1e3
 UNIT_WITHIN = 0.01  # tolerance of a quaternion's length: clients use single precision, some round
 
-_POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
-"""First mask bit of each group of three in POSITION_TARGET_TYPEMASK."""
+_POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6  # first bits of POSITION_TARGET_TYPEMASK
 _FORCE: int = mav.POSITION_TARGET_TYPEMASK_FORCE_SET
 _NO_YAW: int = mav.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 _NO_YAW_RATE: int = mav.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE

@@ -18,8 +18,7 @@ Provider: TypeAlias = Callable[[ReceivedCommand], list[Send] | Refusal]
 MIN_INTERVAL_US = 1_000
 MIN_GROUP_INTERVAL_US = 20_000  # all groups at frame rate would take computing time from the control law
 MAX_INTERVAL_US = 2**31 - 1
-MAX_STREAMED = 128
-"""Limit of streamed messages between two frames of the plant; the others are late, and rates decrease for all."""
+MAX_STREAMED = 128  # between two frames of the plant; the others are late, and rates decrease for all
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
@@ -36,10 +35,7 @@ _OLD_REQUESTS = {
 
 
 class StreamService:
-    """Streams telemetry to every channel at its own rates, and sends messages on request.
-
-    `update` with each frame's snapshot comes before `poll`.
-    """
+    """Streams telemetry to every channel at its own rates, and sends messages on request."""
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 

@@ -1,7 +1,4 @@
-"""Messages that ArduPilot sends beside the common ones.
-
-Source: ArduPilot's GCS_Common.cpp and ardupilotmega.xml. Numbers of its own filters and processor have plain values.
-"""
+"""Messages that ArduPilot sends beside the common ones, as GCS_Common.cpp and ardupilotmega.xml have them."""
 
 from math import degrees, hypot, isfinite
 

@@ -10,10 +10,7 @@ from colibri.mavlink.wire.dialect import bits
 from colibri.mavlink.wire.ned import frd_from_flu
 
 GRAVITY_M_S2 = 9.81
-EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
-"""The earth's field at Zurich: 0.482 gauss, 63.4° below the horizon, 3.3° east of true north. Used everywhere, as it is
-only displayed.
-"""
+EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)  # at Zurich; used everywhere, as it is only displayed
 
 UPDATED = bits(
     "HIGHRES_IMU_UPDATED_", "XACC YACC ZACC XGYRO YGYRO ZGYRO XMAG YMAG ZMAG ABS_PRESSURE PRESSURE_ALT TEMPERATURE"

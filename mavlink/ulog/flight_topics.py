@@ -1,7 +1,4 @@
-"""Colibri's own topics of a flight: tables in SI, ENU and FLU, kept to the last bit.
-
-The file's format, CSV columns and `docs/files.md` are derived from them.
-"""
+"""Colibri's own topics of a flight, in SI, ENU and FLU: the file's format, CSV and docs/files.md derive from them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -116,8 +113,7 @@ DECISION = Topic(
         Columns("qp_iterations", "", "iterations of the QP solver, or `nan`", "float"),
     ),
 )
-MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")
-"""Kinds of measurements of an estimator, in the order of the columns of `FILTER`."""
+MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")  # as in `FILTER`
 ESTIMATE = Topic(
     *("colibri_estimate", 103, "estimate.csv", "a control sample on sensors: the estimate"),
     columns=(

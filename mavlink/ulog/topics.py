@@ -110,10 +110,7 @@ def head(layout: "np.dtype[np.void]", number: int) -> tuple[int, int, int]:
 
 
 class Records:
-    """Data messages of some topics, assigned for many rows at once.
-
-    Consecutive fields of one type are assigned by the first's name, (rows, fields).
-    """
+    """Data messages of some topics; consecutive fields of one type are assigned by the first's name, (rows, fields)."""
 
     def __init__(self, rows: int, *topics: str) -> None:
         self._rows = np.zeros(rows, [(topic, message_layout(TOPICS[topic])) for topic in topics])

@@ -41,8 +41,7 @@ SIGNED = 0x01  # incompatibility flag of a signed frame, https://mavlink.io/en/g
 SIGNATURE_BYTES: int = mav.MAVLINK_SIGNATURE_BLOCK_LEN
 UNKNOWN = "UNKNOWN"  # name of messages outside the dialect
 
-_HEADER = Struct("<BBBBBBBHB")
-"""Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
+_HEADER = Struct("<BBBBBBBHB")  # marker, length, two flags, sequence, system, component, id (low 16 bits, high 8)
 HEADER_BYTES = _HEADER.size
 _MARKER = bytes([MARKER])
 _HEADER_BYTES_V1: int = mav.HEADER_LEN_V1
@@ -102,10 +101,7 @@ def intact(frame: bytes) -> bool | None:
 
 
 class Codec:
-    """Encoder for one component, decoder for any; signatures are not checked.
-
-    MAVLink 2 frames are read and written here, several times as fast as by pymavlink, which decodes all else.
-    """
+    """Encoder for one component, decoder for any, several times as fast as pymavlink; signatures are not checked."""
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
         self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
@@ -118,10 +114,7 @@ class Codec:
         self.dropped: Counter[str] = Counter()  # invalid input, by reason
 
     def encode(self, name: str, *fields: Any) -> bytes:
-        """Encode message `name` with fields in the order of the MAVLink definition, in wire units and frames.
-
-        Text is bytes or UTF-8, cut to its length. `param_value` may be `Bits`.
-        """
+        """Encode a message with fields in MAVLink's order and wire units; text is cut, `param_value` may be `Bits`."""
         layout = _layout_named(name)
         return self.framed(layout.payload(fields), layout.message_id, layout.crc_extra)
 

@@ -1,8 +1,4 @@
-"""Fast encoding and decoding of the messages in every frame of a flight.
-
-Such a message is unsigned, from one component, and of fixed length. One `Struct` reads header and payload into a tuple
-in wire order. Other forms are left to `Codec`.
-"""
+"""Fast encoding and decoding of the messages in every frame: unsigned, of one component and of fixed length."""
 
 from collections.abc import Sequence
 from re import findall
@@ -18,11 +14,7 @@ class FixedFrame:
     """A message up to one of its fields; `size` is the frame's length."""
 
     def __init__(self, name: str, fields: str) -> None:
-        """Lay out the first fields of message `name`, in wire order; the rest is zero.
-
-        "controls[4]" is the first four numbers of an array; "fields_updated:H" has another size, without trailing zero
-        bytes.
-        """
+        """Lay out the first fields in wire order: "controls[4]" is part of an array, "updated:H" has another size."""
         definition = definition_of(name)
         of_dialect = zip(definition.ordered_fieldnames, findall(r"\d*\w", definition.unpacker.format), strict=True)
         numbers, self._names = "", list[tuple[str, int]]()

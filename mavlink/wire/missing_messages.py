@@ -1,8 +1,4 @@
-"""Messages and fields that pymavlink's dialect lacks, as its generator would define them.
-
-Source: mavlink.io/en/messages/common.html, and ardupilotmega.html. CRC_EXTRA follows from the definition, so a mistake
-makes peers drop the message; extension fields are not part of it.
-"""
+"""Messages and fields that pymavlink's dialect lacks. CRC_EXTRA follows from them, but not from extension fields."""
 
 from re import findall
 from struct import Struct, calcsize

@@ -1,8 +1,4 @@
-"""MAVLink 2 message signing: https://mavlink.io/en/guide/message_signing.html.
-
-All components of a network share one key. A signature is 13 bytes after the frame: link id, timestamp, and the first 48
-bits of the SHA-256 of key and all preceding bytes.
-"""
+"""MAVLink 2 message signing: https://mavlink.io/en/guide/message_signing.html."""
 
 from collections.abc import Callable
 from hashlib import sha256
@@ -18,8 +14,7 @@ TICK_US = 10  # unit of timestamps, since `EPOCH_S`
 EPOCH_S = 1_420_070_400  # 1 January 2015, Unix time
 LAST_TICK = (1 << 48) - 1
 NEW_STREAM_TICKS = 6_000_000  # one minute: greatest lag of a new stream behind the own timestamp
-AHEAD_TICKS = 3_000_000
-"""Half a minute: greatest lead before the own clock. It is less, so that no accepted stamp keeps out a right clock."""
+AHEAD_TICKS = 3_000_000  # half a minute: greatest lead; less, so that no accepted stamp keeps out a right clock
 TOO_EARLY = "signed in the future"
 STREAMS = 1024
 
@@ -63,10 +58,7 @@ def tick_at(unix_s: float) -> int:
 
 
 class Signing:
-    """Verifies and signs frames; without a key, accepts all and signs none.
-
-    The own timestamp follows the clock and all frames; it never decreases.
-    """
+    """Verifies and signs frames; without a key, accepts all and signs none. Its timestamp never decreases."""
 
     def __init__(self, key: bytes | None, clock: Callable[[], int], stored: int = 0) -> None:
         """Begin at the later of `clock` and `stored`, in ticks."""
