@@ -1,8 +1,5 @@
 """The progress of many flights on a terminal."""
 
-from collections.abc import Sequence
-from typing import Any
-
 from colibri.campaigns.flights import FlightResult
 
 
@@ -10,17 +7,11 @@ class FlightBar:
     def __init__(self, title: str, flights: int, *, quiet: bool) -> None:
         from rich.console import Console
         from rich.markup import escape
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
         console = Console(stderr=True)
-        columns: Sequence[Any] = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TextColumn("{task.fields[lost]}"),
-            TimeRemainingColumn(),
-        )
+        texts, numbers = ("{task.fields[rate]}", "{task.fields[lost]}"), (BarColumn(), MofNCompleteColumn())
+        columns = ("{task.description}", *numbers, *texts, TimeRemainingColumn())
         hidden = quiet or not console.is_terminal
         self._bar = Progress(*columns, console=console, disable=hidden, speed_estimate_period=300.0)
         self._task = self._bar.add_task(escape(title), total=flights, rate="", lost="", start=False)

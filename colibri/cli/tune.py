@@ -50,12 +50,12 @@ def run(args: Namespace) -> int:
 def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
     from colibri.tuning.run import Watcher
 
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeElapsedColumn())
+    columns = ("{task.description}", BarColumn(), "{task.fields[said]}", TimeElapsedColumn())
     bar = Progress(*columns, console=console, disable=quiet or not console.is_terminal)
     task = bar.add_task(escape(title), total=None, said="")
 

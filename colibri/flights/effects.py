@@ -39,55 +39,44 @@ class FlownOptions(NamedTuple):
         return self.spec.feedback is Feedback.SENSORS or turbulent or any(self.spec.noise.values())
 
     @property
+    def starts_otherwise(self) -> bool:
+        """Whether the start is more than rotor speeds that commands replace at once."""
+        at_once = self.plant_vehicle.rotors.lag is None and self.spec.latency <= 0.0
+        return set(self.spec.start) != {"rotors"} or not at_once
+
+    @property
     def has_parts(self) -> bool:
         return self.whole is None or all(self.whole.without([part]) != self.whole for part in self.spec.without)
 
 
-class EffectRule(NamedTuple):
-    """An option has an effect if this is met, and else not for this reason."""
-
-    option: str
-    reason: str
-    is_met: Callable[[FlownOptions], bool]
-
-
 _NO_DRAG = "vehicle {vehicle} has no drag"
 _NO_STATIONS = "no ground station is served"
-RULES = (
-    EffectRule("wind", _NO_DRAG, lambda it: it.has_drag),
-    EffectRule("gusts", _NO_DRAG, lambda it: it.has_drag),
-    EffectRule(
-        "gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)
-    ),
-    EffectRule(
-        "events", "each is after the flight", lambda it: any(event.t < it.spec.duration for event in it.spec.events)
-    ),
-    EffectRule(
-        "events", _NO_DRAG, lambda it: it.has_drag or any(not isinstance(event, Blow) for event in it.spec.events)
-    ),
-    EffectRule("turbulence", _NO_DRAG, lambda it: it.has_drag),
-    EffectRule("seed", "only sensors, turbulence on drag, and noise are random", lambda it: it.is_random),
-    EffectRule("noise", "each is 0", lambda it: any(it.spec.noise.values())),
-    EffectRule("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
-    EffectRule(
-        "start",
-        "rotors of vehicle {vehicle} follow commands at once",
-        lambda it: set(it.spec.start) != {"rotors"} or it.plant_vehicle.rotors.lag is not None or it.spec.latency > 0.0,
-    ),
-    EffectRule("plant_vehicle", "it is the vehicle of the autopilot", lambda it: it.whole != it.vehicle),
-    EffectRule("tlog", "link direct sends no frames", lambda it: it.spec.link != "direct"),
-    EffectRule("signing_key", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
-    EffectRule("insecure", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
-    EffectRule("spacing", "one vehicle flies", lambda it: it.spec.count > 1),
+RULES: tuple[tuple[str, str, Callable[[FlownOptions], bool]], ...] = (
+    ("wind", _NO_DRAG, lambda it: it.has_drag),
+    ("gusts", _NO_DRAG, lambda it: it.has_drag),
+    ("gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)),
+    ("events", "each is after the flight", lambda it: any(event.t < it.spec.duration for event in it.spec.events)),
+    ("events", _NO_DRAG, lambda it: it.has_drag or not all(isinstance(event, Blow) for event in it.spec.events)),
+    ("turbulence", _NO_DRAG, lambda it: it.has_drag),
+    ("seed", "only sensors, turbulence on drag, and noise are random", lambda it: it.is_random),
+    ("noise", "each is 0", lambda it: any(it.spec.noise.values())),
+    ("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
+    ("start", "rotors of vehicle {vehicle} follow commands at once", lambda it: it.starts_otherwise),
+    ("plant_vehicle", "it is the vehicle of the autopilot", lambda it: it.whole != it.vehicle),
+    ("tlog", "link direct sends no frames", lambda it: it.spec.link != "direct"),
+    ("signing_key", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    ("insecure", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    ("spacing", "one vehicle flies", lambda it: it.spec.count > 1),
 )
+"""Option, the reason why it has no effect, and the condition under which it has one."""
 
 
 def without_effect(setting: FlownOptions) -> dict[str, str]:
     """Return the options given without effect, and the reason of each."""
     known = fields_of(type(setting.spec))
     given = {name for name, field in known.items() if getattr(setting.spec, name) != field.default}
-    lacking = (need for need in RULES if need.option in given and not need.is_met(setting))
-    return {need.option: need.reason.format(vehicle=setting.name) for need in lacking}
+    lacking = (rule for rule in RULES if rule[0] in given and not rule[2](setting))
+    return {option: reason.format(vehicle=setting.name) for option, reason, _ in lacking}
 
 
 def in_words(reasons: Iterable[tuple[str, str]], title: str = "no effect") -> str:

@@ -10,19 +10,9 @@ from rich.table import Table
 _REDRAW_EVERY_S = 0.5
 _SHOWN = ("compiling", "ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
 """Events with a line of their own."""
-_COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
-    ("id", 3, "right"),
-    ("time", 6, "right"),
-    ("real", 6, "right"),
-    ("mode", 10, "left"),
-    ("rotors", 8, "left"),
-    ("east", 6, "right"),
-    ("north", 6, "right"),
-    ("up", 7, "right"),
-    ("speed", 8, "right"),
-    ("solver", 6, "right"),
-)
-"""Heading, least width and alignment; wide enough for usual values, so that columns stay in place."""
+_COLUMNS = {"id": 3, "time": 6, "real": 6, "mode": 10, "rotors": 8, "east": 6, "north": 6, "up": 7}
+_COLUMNS |= {"speed": 8, "solver": 6}
+"""Least widths: enough for usual values, so that columns stay in place."""
 _FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real", "solver")
 """Columns by priority, for a narrow terminal."""
 _LINKS_WIDTH = 66
@@ -76,30 +66,29 @@ def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
     """Return a row per vehicle and per link; in a fleet, only links with a ground station."""
     shown = _shown(width)
     vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
-    for heading, least, side in _COLUMNS:
-        if heading in shown:
-            vehicles.add_column(heading, no_wrap=True, min_width=least, justify=side)
+    for heading in shown:
+        side: Literal["left", "right"] = "left" if heading in ("mode", "rotors") else "right"
+        vehicles.add_column(heading, no_wrap=True, min_width=_COLUMNS[heading], justify=side)
     links = Table(box=None, padding=(0, 2, 0, 0), show_header=False, style="dim")
     for side in _LINK_SIDES:
         links.add_column(no_wrap=True, justify=side)
     for instance, fact in sorted(facts.items()):
         system = str(instance + 1)
-        texts = (system, *_vehicle_texts(fact))
-        vehicles.add_row(*(text for (heading, *_), text in zip(_COLUMNS, texts, strict=True) if heading in shown))
+        texts = dict(zip(_COLUMNS, (system, *_vehicle_texts(fact)), strict=True))
+        vehicles.add_row(*(texts[heading] for heading in shown))
         for link in fact["links"]:
             if link["heard"] or len(facts) == 1:
                 links.add_row(f"{system:>3}", *_link_texts(link, width))
     return Group(vehicles, links)
 
 
-def _shown(width: int) -> set[str]:
-    least = {heading: width for heading, width, _ in _COLUMNS}
-    shown: list[str] = []
-    for heading in _FIRST:
-        if shown and sum(least[each] + 1 for each in (*shown, heading)) > width:
+def _shown(width: int) -> list[str]:
+    shown = [_FIRST[0]]
+    for heading in _FIRST[1:]:
+        if sum(_COLUMNS[each] + 1 for each in (*shown, heading)) > width:
             break
         shown.append(heading)
-    return set(shown)
+    return sorted(shown, key=[*_COLUMNS].index)
 
 
 def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:

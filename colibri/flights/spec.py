@@ -72,8 +72,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
     """The law and its vehicle, the plant and its world."""
 
     plant_vehicle: Annotated[
-        str | Vehicle | None,
-        Option("another vehicle for the plant, to test the law with a wrong model", "NAME"),
+        str | Vehicle | None, Option("another vehicle for the plant, to test the law with a wrong model", "NAME")
     ] = None
 
 
@@ -97,8 +96,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
         Option("udp: two processes; memory: one process, same codec, same flight; direct: without the codec"),
     ] = "memory"
     speed: Annotated[
-        float | None,
-        Option("times real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True),
+        float | None, Option("times real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True)
     ] = None
     duration: Annotated[float, Option("simulated time", "S", "s", above=0.0)] = 100.0
     window: Annotated[

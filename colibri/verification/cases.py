@@ -1,7 +1,6 @@
 """Named flights."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,10 +26,8 @@ class TrackCase(NamedTuple):
     waypoints: str = ""
 
     def plan(self, out: Path, **more: Any) -> FlightPlan:
-        options = dict(self.options)
-        if self.waypoints:
-            options["track"] = f"waypoints:{out / _WAYPOINTS_FILE}"
-        return FlightPlan.of(FlightSpec.of(**(options | {"out": out} | more)))
+        track = {"track": f"waypoints:{out / _WAYPOINTS_FILE}"} if self.waypoints else {}
+        return FlightPlan.of(FlightSpec.of(**(self.options | track | {"out": out} | more)))
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
         """Return the hash of the trajectory; logs are in `out`."""
@@ -43,13 +40,12 @@ class TrackCase(NamedTuple):
         return sha256
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SitlCase:
+class SitlCase(NamedTuple):
     """A flight commanded by a ground station, by keys of `Setting`."""
 
     name: str
     orders: "Callable[[Sitl], object]"
-    setting: Mapping[str, Any] = field(default_factory=dict)
+    setting: Mapping[str, Any] = {}
 
     def fly(self, out: Path, link: str) -> str:
         """Return the hash of all truth and commands; logs are in `out`."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.sitl import mission_items
 from colibri.verification.cases import SitlCase, TrackCase
 
 if TYPE_CHECKING:
@@ -27,13 +26,14 @@ def _flown(name: str, track: str, duration: float, profile: str = "flight", **op
     return TrackCase(name, {"track": track, "profile": profile, "duration": duration, **options})
 
 
+def _on_sensors(turbulence: str, seed: int) -> dict[str, Any]:
+    return {"feedback": "sensors", "wind": "5@270", "turbulence": turbulence, "seed": seed}
+
+
 def _mission(sitl: "Sitl") -> None:
-    corner = [
-        mission_items.waypoint(8.0, 0.0, 4.0),
-        mission_items.change_speed(8.0),
-        mission_items.waypoint(8.0, 12.0, 5.0, stay_s=0.5),
-    ]
-    sitl.upload_mission([mission_items.takeoff(4.0), *corner, mission_items.land(4.0, 6.0)])
+    first, last = sitl.items.waypoint(8.0, 0.0, 4.0), sitl.items.waypoint(8.0, 12.0, 5.0, stay_s=0.5)
+    plan = [sitl.items.takeoff(4.0), first, sitl.items.change_speed(8.0), last, sitl.items.land(4.0, 6.0)]
+    sitl.upload_mission(plan)
     sitl.start_mission()
     sitl.wait_until(lambda: not sitl.armed, within=60.0, what="the landing")
 
@@ -93,20 +93,10 @@ FLIGHTS: tuple[TrackCase | SitlCase, ...] = (
     *(_flown(f"thesis-{track}", track, 20.0, "thesis") for track in TRACKS),
     *(_flown(track, track, 6.0) for track in TRACKS),
     # By orders of a ground station.
-    SitlCase(name="mission", orders=_mission),
-    SitlCase(
-        name="mission-on-sensors",
-        orders=_mission,
-        setting={"feedback": "sensors", "wind": "5@270", "turbulence": "light", "seed": 4},
-    ),
-    SitlCase(name="rotor-lost", orders=_rotor_lost, setting={"airborne": 12.0, "wind": "5@200", "turbulence": "light"}),
-    SitlCase(
-        name="rotor-lost-on-sensors",
-        orders=_rotor_lost_on_sensors,
-        setting={"feedback": "sensors", "wind": "5@270", "turbulence": "moderate", "seed": 3},
-    ),
-    SitlCase(name="autopilot-restarted", orders=_restarted, setting={"airborne": 8.0}),
-    SitlCase(
-        name="sticks-by-se3", orders=_sticks, setting={"airborne": 8.0, "controller": "geometric-se3", "wind": "5@90"}
-    ),
+    SitlCase("mission", _mission),
+    SitlCase("mission-on-sensors", _mission, _on_sensors("light", 4)),
+    SitlCase("rotor-lost", _rotor_lost, {"airborne": 12.0, "wind": "5@200", "turbulence": "light"}),
+    SitlCase("rotor-lost-on-sensors", _rotor_lost_on_sensors, _on_sensors("moderate", 3)),
+    SitlCase("autopilot-restarted", _restarted, {"airborne": 8.0}),
+    SitlCase("sticks-by-se3", _sticks, {"airborne": 8.0, "controller": "geometric-se3", "wind": "5@90"}),
 )

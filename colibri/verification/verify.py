@@ -13,18 +13,14 @@ from colibri.verification.cases import SHOWN, TrackCase, show_table
 
 DEFAULT_DURATION_S = 20.0
 
+SENSORS, MODERATE = {"profile": "flight", "feedback": Feedback.SENSORS}, {"turbulence": "moderate"}
 CASES = (
     TrackCase("thesis-spiral", {"track": "spiral", "profile": "thesis"}),
     TrackCase("spiral", {"track": "spiral", "profile": "flight"}),
-    TrackCase(
-        "lemniscate-in-gusts", {"track": "lemniscate", "profile": "flight", "wind": "5@270", "turbulence": "moderate"}
-    ),
+    TrackCase("lemniscate-in-gusts", {"track": "lemniscate", "profile": "flight", "wind": "5@270", **MODERATE}),
     TrackCase("circle-by-se3", {"track": "circle", "profile": "se3"}),
-    TrackCase("spiral-on-sensors", {"track": "spiral", "profile": "flight", "feedback": Feedback.SENSORS}),
-    TrackCase(
-        "wave-on-sensors-in-gusts",
-        {"track": "wave", "profile": "flight", "feedback": Feedback.SENSORS, "wind": "8@270", "turbulence": "moderate"},
-    ),
+    TrackCase("spiral-on-sensors", {"track": "spiral", **SENSORS}),
+    TrackCase("wave-on-sensors-in-gusts", {"track": "wave", **SENSORS, "wind": "8@270", **MODERATE}),
 )
 SEED = 7
 

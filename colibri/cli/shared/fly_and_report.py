@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, TypeAlias
 
 from colibri.analysis.limits import exceeded, loss_exceeds
 from colibri.common.errors import Error
@@ -97,32 +97,25 @@ def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool
     return found
 
 
-class Shown(NamedTuple):
-    progress: Callable[[float], None]
-    say: Callable[[str], None]
-    compiling: Callable[[int], None]
+Shown: TypeAlias = tuple[Callable[[float], None], Callable[[str], None], Callable[[int], None]]
 
 
 @contextmanager
 def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
+    """Yield functions that show the simulated time, a line, and the number of functions compiled."""
     if quiet:
-        yield Shown(unseen, unseen, unseen)
+        yield unseen, unseen, unseen
         return
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:6.1f} / {task.total:.1f} s"),
-        TextColumn("{task.fields[speed]}"),
-        TimeElapsedColumn(),
-    )
+    texts = ("{task.completed:6.1f} / {task.total:.1f} s", "{task.fields[speed]}")
+    columns = ("{task.description}", BarColumn(), *texts, TimeElapsedColumn())
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
     task = bar.add_task(escape(plan.spec.track), total=plan.spec.duration, speed="", start=False)
-    counted = (TextColumn("{task.completed} functions"), BarColumn(), TimeElapsedColumn())
+    counted = ("{task.completed} functions", BarColumn(), TimeElapsedColumn())
     compiler = Progress(*counted, console=console, disable=not console.is_terminal, transient=True)
     compilation = compiler.add_task("", total=None)
     first_s: list[float] = []
@@ -152,7 +145,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
         compiler.update(compilation, completed=functions)
 
     try:
-        yield Shown(show, say, compiling)
+        yield show, say, compiling
         bar.update(task, completed=plan.spec.duration)
     finally:
         compiler.stop()
