@@ -163,15 +163,11 @@ def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, A
     given = {name: plain(value) for name, value in given.items()}
     read_settings(given, kind)
     named = {name_in_tables(*each) for table in kind.FACTORS for each in given.get(table, {}).items()}
-    changed = dict(given) | {
-        table: {
-            **{key: value for key, value in getattr(base, table).items() if name_in_tables(key, value) not in named},
-            **given.get(table, {}),
-        }
-        for table in kind.FACTORS
-    }
+    for table in kind.FACTORS:
+        kept = {key: value for key, value in getattr(base, table).items() if name_in_tables(key, value) not in named}
+        given[table] = kept | given.get(table, {})
     called = {} if file is None or base.name != kind().name else {"name": Path(file).stem}
-    return msgspec.structs.replace(base, **(called | changed))
+    return msgspec.structs.replace(base, **(called | given))
 
 
 def campaign_of(tables: CampaignTables) -> Campaign:

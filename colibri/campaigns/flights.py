@@ -134,7 +134,10 @@ def check(points: Iterable[Point], common: Common, *, ignored: Collection[str] =
 def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[FlightResult, None, None]:
     with closing(engine.each(fly_point, common, points)) as results:
         for point, result in results:
-            yield _killed(point, common) if isinstance(result, Killed) else result
+            if isinstance(result, Killed):
+                why = "the process that flew it was killed, and again when it flew this alone"
+                result = FlightResult(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")
+            yield result
 
 
 def fly_point(common: Common, point: Point) -> FlightResult:
@@ -175,11 +178,6 @@ def plan_point(common: Common, point: Point) -> FlightPlan:
         spec = replace(spec, profile=profile, vehicle=vehicle, plant_vehicle=plant_vehicle)
     text = common.track_files.get(spec.track) if isinstance(spec.track, str) else file_text(spec.track)
     return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, text, whole))
-
-
-def _killed(point: Point, common: Common) -> FlightResult:
-    why = "the process that flew it was killed, and again when it flew this alone"
-    return FlightResult(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")
 
 
 def _object(given: Any, known: Mapping[str, Any]) -> Any:

@@ -10,8 +10,7 @@ from rich.table import Table
 _REDRAW_EVERY_S = 0.5
 _SHOWN = ("compiling", "ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
 """Events with a line of their own."""
-_COLUMNS = {"id": 3, "time": 6, "real": 6, "mode": 10, "rotors": 8, "east": 6, "north": 6, "up": 7}
-_COLUMNS |= {"speed": 8, "solver": 6}
+_COLUMNS = dict(id=3, time=6, real=6, mode=10, rotors=8, east=6, north=6, up=7, speed=8, solver=6)
 """Least widths: enough for usual values, so that columns stay in place."""
 _FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real", "solver")
 """Columns by priority, for a narrow terminal."""

@@ -254,16 +254,14 @@ def _begun(setup: Setup) -> Autopilot[Any]:
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
         estimator = estimator_for(setup.feedback, vehicle, setup.origin)
-        return track_autopilot(profile, vehicle, flown, _clock, estimator=estimator)
+        return track_autopilot(profile, vehicle, flown, lambda: _NO_CLOCK_S, estimator=estimator)
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
     )
-    history = of_bytes(History, setup.history) if setup.history else None
-    return copter_autopilot(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
-
-
-def _clock() -> float:
-    return _NO_CLOCK_S
+    values, history = setup.values, of_bytes(History, setup.history) if setup.history else None
+    return copter_autopilot(
+        profile, vehicle, settings, lambda: _NO_CLOCK_S, values=values, first=flown, history=history
+    )
 
 
 def _rotors(command: ActuatorCommand) -> str:

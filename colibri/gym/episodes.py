@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 from math import ceil
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -32,9 +32,8 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-ActionKind = Literal["rotors", "rates", "attitude", "velocity", "position"]
-ACTIONS: tuple[ActionKind, ...] = get_args(ActionKind)
-PILOTED: tuple[ActionKind, ...] = ACTIONS[2:]
+ACTIONS = ("rotors", "rates", "attitude", "velocity", "position")
+PILOTED = ACTIONS[2:]
 """Actions through the whole autopilot."""
 ENDS = (
     *("", "too far from the reference", "ground", "state not finite"),

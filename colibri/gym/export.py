@@ -37,7 +37,7 @@ def export_policy(path: str | Path, env: Any, layers: Layers | None = None) -> P
     if layers is not None:
         path.write_bytes(_model(layers))
     table = path.with_suffix(".toml")
-    law = OnnxLaw(OnnxFile(str(path), _read(path), inputs), {}, episodes.vehicle, _stopped)
+    law = OnnxLaw(OnnxFile(str(path), _read(path), inputs), {}, episodes.vehicle, lambda: 0.0)
     law.act(np.zeros(episodes.observations.shape[1], dtype=np.float32))
     lines = [f"{key} = {msgspec.json.encode(value).decode()}" for key, value in msgspec.structs.asdict(inputs).items()]
     table.write_text("\n".join([_HEAD.format(path.name), *lines, ""]), encoding="utf-8")
@@ -87,7 +87,3 @@ def _model(layers: Layers) -> bytes:
     checker.check_model(model)
     whole: bytes = model.SerializeToString()
     return whole
-
-
-def _stopped() -> float:
-    return 0.0

@@ -1,7 +1,7 @@
 """Episodes through the whole autopilot: modes, limits, failsafes and, on sensors, the estimator."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -31,8 +31,7 @@ from colibri.plant.physics.start import IntegrationError, Start
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 
-ObservationKind = Literal["truth", "estimate"]
-OBSERVATIONS: tuple[ObservationKind, ...] = get_args(ObservationKind)
+OBSERVATIONS = ("truth", "estimate")
 SETTLE_S = 3.0
 """Flown at the start of the reference, once for each environment."""
 _READY_WITHIN_S = 60.0
@@ -103,7 +102,7 @@ class PilotedEpisodes(Episodes):
         x, y, z = self._first[:3].tolist()
         settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=feedback, reports=False)
         values = {"MIS_TAKEOFF_ALT": z}
-        autopilot = copter_autopilot(flown, self.vehicle, settings, _stopped, values=values)
+        autopilot = copter_autopilot(flown, self.vehicle, settings, lambda: 0.0, values=values)
         start = Start(x=x, y=y) if self._estimates else Start(x=x, y=y, z=z, rotors=self.vehicle.hover_rpm)
         builder = PlantBuilder(WorldSpec(), self.vehicle, {feedback: start})
         return SteppedFlight(builder.build(feedback, autopilot.frame_interval_us), autopilot, Direct())
@@ -239,7 +238,3 @@ class PilotedEpisodes(Episodes):
 
 
 _NO_RATES: Vector = (float("nan"), float("nan"), float("nan"))
-
-
-def _stopped() -> float:
-    return 0.0

@@ -33,17 +33,10 @@ class StatusTexts(Inbox):
                 self.times_us += [now_us] * (len(self.texts) - len(self.times_us))
 
 
-COLUMNS = (
-    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
-    *("control1", "control2", "control3", "control4", "armed", "custom_mode"),
-)
-"""Truth in SI, ENU and FLU; controls of all rotors as fractions of the largest speed; HEARTBEAT's custom mode."""
-PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT = (
-    *("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json"),
-)
+_STATE = ("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r")
+KEPT = ("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json")
 """Files of a flight."""
-
-_CONTROL = COLUMNS.index("control1")
+PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -80,7 +73,7 @@ class Record:
         return self._hash.hexdigest()
 
     def columns(self, since_s: float = 0.0) -> Columns:
-        """Return `COLUMNS` from a time on, one array each."""
+        """Return truth in SI, ENU and FLU, controls as fractions of the largest speed, and HEARTBEAT's custom mode."""
         table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(self._names))
         return dict(zip(self._names, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
@@ -100,8 +93,7 @@ class Record:
 
 def _layout(rotors: int) -> tuple[tuple[str, ...], Struct, Struct]:
     """Return names and layout of the rows of a vehicle, and the layout of what is hashed."""
-    controls = (f"control{number}" for number in range(1, rotors + 1))
-    names = (*COLUMNS[:_CONTROL], *controls, *COLUMNS[-2:])
+    names = (*_STATE, *(f"control{number}" for number in range(1, rotors + 1)), "armed", "custom_mode")
     return names, Struct(f"<{len(names)}d"), Struct(f"<Q13d{rotors}d?")
 
 

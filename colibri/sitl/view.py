@@ -124,7 +124,7 @@ class View:
         return dist(place, self.position) < near_m and self.speed_m_s < slow_m_s
 
     def flown(self, since_s: float = 0.0) -> Columns:
-        """Return `record.COLUMNS` from a time on, an array each."""
+        """Return `record.columns` from a time on."""
         return self.record.columns(since_s)
 
     @property

@@ -138,7 +138,7 @@ def in_order(
 ) -> list[Result]:
     """Return results in the order of jobs, and `keep` each at once."""
     found: dict[int, Result] = {}
-    with closing(Pool().each(_numbered, work, enumerate(jobs))) as done:
+    with closing(Pool().each(lambda own, job: own(job[1]), work, enumerate(jobs))) as done:
         for (number, job), result in with_bar(done, title, len(jobs), quiet=quiet):
             if isinstance(result, Killed):
                 raise CampaignError(f"{title}: the process that did {job} was killed, and again when it did this alone")
@@ -154,7 +154,3 @@ def with_bar(done: Iterable[Done], title: str, total: int, *, quiet: bool) -> Ge
     console = Console(stderr=True)
     with Progress(console=console, disable=quiet or not console.is_terminal) as bar:
         yield from bar.track(done, total, description=title)
-
-
-def _numbered(work: Callable[[Job], Result], job: tuple[int, Job]) -> Result:
-    return work(job[1])
