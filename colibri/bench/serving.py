@@ -20,8 +20,8 @@ from colibri.bench.stages import Figures, summary
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen
 from colibri.flights.flight import Direct, SteppedFlight
+from colibri.flights.fly import fly_processes
 from colibri.flights.plan import FlightPlan
-from colibri.flights.processes import fly_processes
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.rates import GCS, SDK
 from colibri.plant.process.start import nudged

@@ -18,7 +18,15 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from colibri.analysis.export import log_file, read_log, write_csv, write_flight_tables, write_mcap, write_parquet
+    from colibri.analysis.export import (
+        log_file,
+        read_log,
+        write_csv,
+        write_flight_tables,
+        write_mat,
+        write_mcap,
+        write_parquet,
+    )
     from colibri.common.errors import Error
 
     if not (args.mcap or args.csv or args.mat or args.parquet):
@@ -35,8 +43,6 @@ def run(args: Namespace) -> int:
         if args.csv:
             written.append(write_csv(log, tables))
         if args.mat:
-            from colibri.analysis.export import write_mat
-
             written.append(write_mat(log, path, path.with_suffix(".mat")))
         if args.parquet:
             written.append(write_parquet(log, tables))

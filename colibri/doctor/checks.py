@@ -1,25 +1,29 @@
-"""The checks of `colibri doctor`."""
+"""`colibri doctor`: the checks, and their findings as a table."""
 
+import argparse
 import os
 import platform
 import re
 import socket
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import StrEnum
+from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import psutil
 from packaging.requirements import Requirement
 
 import colibri
 from colibri.common.errors import Error
+from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.common.types import Address
 from colibri.flights.fleet_spec import GROUND_PORT, PLANT_PORT, SDK_PORT
 from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav
 
 
@@ -263,3 +267,46 @@ def _station(codec: Codec, datagram: bytes) -> int | None:
     kinds: Sequence[int] = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER)
     beats = (it for it in codec.decode(datagram) if it.name == "HEARTBEAT" and it.fields.type in kinds)
     return next((it.source[0] for it in beats), None)
+
+
+Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]
+
+CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)
+"""In order."""
+_COLORS = {Severity.FINE: "green", Severity.NOTE: "yellow", Severity.FAILED: "bold red"}
+
+
+def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
+    for check in checks:
+        found = check()
+        if isinstance(found, Finding):
+            yield found
+        elif found is not None:
+            yield from found
+
+
+def examine_as_told(args: argparse.Namespace) -> int:
+    link = None if args.gcs is None else open_ground_link(args.gcs)
+    asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
+    failed = 0
+    for finding in examine([*CHECKS, *asked]):
+        failed += finding.verdict is Severity.FAILED
+        show(finding)
+    if link is not None:
+        link.close()
+    return EXIT_FAILED if failed else 0
+
+
+def show(finding: Finding) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table.grid(padding=(0, 2))
+    for width in (6, 26):
+        table.add_column(width=width, no_wrap=True)
+    table.add_column()
+    table.add_row(Text(finding.verdict, _COLORS[finding.verdict]), Text(finding.checked), Text(finding.found))
+    if finding.advice:
+        table.add_row("", "", Text(f"→ {finding.advice}"))
+    Console().print(table)

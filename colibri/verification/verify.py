@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
-from colibri.flights.processes import FlightError
+from colibri.flights.fly import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.verification.cases import SHOWN, TrackCase, show_table

@@ -10,7 +10,7 @@ import pytest
 import colibri
 from colibri.autopilot.control.registry import DecisionError
 from colibri.common.errors import Error, InFlightError
-from colibri.flights.processes import FlightError
+from colibri.flights.fly import FlightError
 from colibri.mavlink.links.link import LinkError
 from colibri.plant.physics.start import IntegrationError
 from colibri.sitl.stepping import NotInTimeError

@@ -21,11 +21,8 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from colibri.common.process.lifecycle import fail
-    from colibri.doctor.examine import examine_as_told
-    from colibri.mavlink.links.link import LinkError
+    from colibri.common.process.lifecycle import one_line
+    from colibri.doctor.checks import examine_as_told
 
-    try:
+    with one_line():
         return examine_as_told(args)
-    except LinkError as error:
-        fail(str(error))

@@ -12,10 +12,9 @@ from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted, one_line
 from colibri.common.spec import from_namespace
 from colibri.flights.effects import in_words
-from colibri.flights.fly import fly_plan
+from colibri.flights.fly import FlightError, fly_plan
 from colibri.flights.folder import occupied, prepare
 from colibri.flights.plan import FlightPlan, FrameCount, unseen
-from colibri.flights.processes import FlightError
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.links.startup import COMPILING
 from colibri.mavlink.ulog.reader import FILE

@@ -7,10 +7,7 @@ import pytest
 
 from colibri.cli.main import main
 from colibri.common.machine_code import on_disk
-from colibri.doctor import checks as flying
-from colibri.doctor import checks as network
-from colibri.doctor import checks as packages
-from colibri.doctor import examine
+from colibri.doctor import checks
 from colibri.doctor.checks import Finding, Severity, called, ground_station
 from colibri.flights.fleet_spec import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
@@ -27,13 +24,13 @@ ROUTES = (
 @pytest.fixture
 def taken() -> Iterator[int]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mine:
-        mine.bind((network.HOST, 0))
+        mine.bind((checks.HOST, 0))
         yield mine.getsockname()[1]
 
 
 def test_this_computer_flies() -> None:
     """What the tests themselves need is there; whether a port is free depends on who else flies here."""
-    found = list(examine.examine([packages.packages, network.loopback, flying.machine_code, flying.flight]))
+    found = list(checks.examine([checks.packages, checks.loopback, checks.machine_code, checks.flight]))
     assert [finding.verdict for finding in found] == [Severity.FINE] * 4
     assert "times real time" in found[-1].found
 
@@ -42,7 +39,7 @@ def test_what_failed_is_shown_with_what_to_do_and_ends_with_1(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(examine, "CHECKS", (lambda: FINE, lambda: None, lambda: [FINE, FAILED]))
+    monkeypatch.setattr(checks, "CHECKS", (lambda: FINE, lambda: None, lambda: [FINE, FAILED]))
     assert main(["doctor"]) == 1
     assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
         ["fine", "one", "there"],
@@ -50,26 +47,26 @@ def test_what_failed_is_shown_with_what_to_do_and_ends_with_1(
         ["failed", "other", "not", "there"],
         ["→", "put", "it", "there"],
     ]
-    monkeypatch.setattr(examine, "CHECKS", (lambda: FINE,))
+    monkeypatch.setattr(checks, "CHECKS", (lambda: FINE,))
     assert main(["doctor"]) == 0
 
 
 def test_packages_that_are_missing_too_old_or_others_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    has, others = packages.version_of, {"daqp": None, "numpy": "1.20.0", "rich": "0.0.1", "optuna": None}
-    monkeypatch.setattr(packages, "version_of", lambda name: others[name] if name in others else has(name))
-    needed, locked = packages.packages(), packages.lock()
+    has, others = checks.version_of, {"daqp": None, "numpy": "1.20.0", "rich": "0.0.1", "optuna": None}
+    monkeypatch.setattr(checks, "version_of", lambda name: others[name] if name in others else has(name))
+    needed, locked = checks.packages(), checks.lock()
     assert (needed.verdict, needed.found[:45]) == (Severity.FAILED, "daqp is missing, numpy is 1.20.0, not >=2.0, ")
     assert locked is not None
     assert locked.verdict is Severity.NOTE
     assert "rich is 0.0.1, not ==" in locked.found
-    (tune,) = [finding for finding in packages.extras() if finding.checked == "extra tune"]
+    (tune,) = [finding for finding in checks.extras() if finding.checked == "extra tune"]
     assert (tune.verdict, tune.advice) == (Severity.NOTE, "if you need it: pip install 'colibri-sitl[tune]'")
 
 
 def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, taken: int) -> None:
-    monkeypatch.setattr(network, "PLANT_PORT", taken)
-    monkeypatch.setattr(network, "GROUND_PORT", taken)
-    ground, _, plant = network.ports()
+    monkeypatch.setattr(checks, "PLANT_PORT", taken)
+    monkeypatch.setattr(checks, "GROUND_PORT", taken)
+    ground, _, plant = checks.ports()
     assert ground.verdict is Severity.FINE
     assert f"(process {os.getpid()}) is listening" in ground.found
     assert plant.verdict is Severity.FAILED
@@ -78,22 +75,22 @@ def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, tak
 
 
 def test_the_way_out_of_a_container_is_the_default_gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert network.gateway(ROUTES) == "172.19.0.1"
-    assert network.gateway("\n".join(ROUTES.splitlines()[:2])) is None
+    assert checks.gateway(ROUTES) == "172.19.0.1"
+    assert checks.gateway("\n".join(ROUTES.splitlines()[:2])) is None
     (tmp_path / "routes").write_text(ROUTES, encoding="ascii")
-    monkeypatch.setattr(network, "_ROUTES", tmp_path / "routes")
-    monkeypatch.setattr(network, "_CONTAINERS", (tmp_path,))
-    found = network.beyond()
+    monkeypatch.setattr(checks, "_ROUTES", tmp_path / "routes")
+    monkeypatch.setattr(checks, "_CONTAINERS", (tmp_path,))
+    found = checks.beyond()
     assert found is not None
     assert "--gcs udpout:172.19.0.1:14550" in found.advice
-    monkeypatch.setattr(network, "_CONTAINERS", (tmp_path / "none",))
-    monkeypatch.setattr(network, "_in_wsl", lambda: False)
-    assert network.beyond() is None
+    monkeypatch.setattr(checks, "_CONTAINERS", (tmp_path / "none",))
+    monkeypatch.setattr(checks, "_in_wsl", lambda: False)
+    assert checks.beyond() is None
 
 
 def test_a_folder_for_machine_code_that_is_none_is_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(on_disk, "folders", list)
-    found = flying.machine_code()
+    found = checks.machine_code()
     assert (found.verdict, found.advice) == (Severity.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
 
 
@@ -102,7 +99,7 @@ def test_a_ground_station_is_known_by_its_heartbeat(kind: int, *, is_one: bool) 
     beat = Codec(255, 190).encode("HEARTBEAT", kind, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
     link = open_ground_link("udpin:127.0.0.1:0")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-        station.sendto(beat, (network.HOST, int(link.url.rpartition(":")[2])))
+        station.sendto(beat, (checks.HOST, int(link.url.rpartition(":")[2])))
         answers = called(link, within_s=10.0 if is_one else 0.05)
     link.close()
     assert (answers is not None) == is_one
