@@ -22,8 +22,7 @@ from colibri.sitl.summary import FLOWN, SAID, Summary, attachments, in_system_ou
 
 if TYPE_CHECKING:
     from colibri.sitl.backends.launcher import Launcher
-    from colibri.sitl.fleet import Fleet
-    from colibri.sitl.session import Flights
+    from colibri.sitl.session import Fleet, Flights
     from colibri.sitl.vehicle import Sitl
 
 LINKS = ("memory", "udp")
@@ -99,7 +98,7 @@ def sitl_seed(request: pytest.FixtureRequest) -> int | None:
 @pytest.fixture
 def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., Fleet]]:
     """Return a function that begins fleets: each vehicle with the marks of the test."""
-    from colibri.sitl.fleet import begin_fleet
+    from colibri.sitl.session import begin_fleet
 
     with ExitStack() as stack:
         flights = _flights(request, sitl_seed, stack)

@@ -43,11 +43,11 @@ class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """Tables shared by the files of campaigns and tunings.
 
     Attributes:
-        FACTORS: Tables that hold factors.
         seeds: One, several, or `1-20`; every combination of the grid is flown with each.
         root_seed: Seed of the draws.
         grid: Factors with several values. A factor that is neither option nor key has levels: named tables of settings.
         draw: Factors drawn at random for each flight.
+
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")

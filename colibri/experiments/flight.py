@@ -34,9 +34,9 @@ class Flight:
     """A finished flight in memory.
 
     Attributes:
-        plan: The plan flown.
         report: The numbers of `report.json`.
         log: The topics of its log.
+
     """
 
     def __init__(self, plan: FlightPlan, report: Report, log: TopicReader) -> None:

@@ -41,7 +41,7 @@ class Member:
         instance: Ports and system id follow from it.
         links: URLs that its autopilot serves; once open, with actual ports.
         boot_unix_us: Start of its plant, which dates telemetry logs.
-        deaths_s: Wall-clock times when a process died.
+
     """
 
     instance: int

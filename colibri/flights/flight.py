@@ -94,8 +94,8 @@ class Direct:
 class InMemory:
     """Carries the datagrams of two processes in memory; `traffic` records all frames.
 
-    A frame without others beside it is only rounded as its datagram would round it, unless traffic is recorded. With
-    `replayed`, those of sensors are encoded: a replay needs them.
+    A frame alone is only rounded as its datagram would round it, unless it is recorded, or of sensors and `replayed`.
+
     """
 
     def __init__(

@@ -67,7 +67,7 @@ class Child:
         return self._process.exitcode if isinstance(self._process, BaseProcess) else self._process.poll()
 
     def read(self) -> list[dict[str, Any]]:
-        """Return the events printed since the last time; wait for the first."""
+        """Return the events printed since the last time, or wait for one."""
         assert self.stdout is not None, "read only where it is piped"
         *lines, self._rest = (self._rest + os.read(self.stdout.fileno(), 65536)).split(b"\n")
         return [json.loads(line) for line in lines]
@@ -173,7 +173,7 @@ def how_it_ended(code: int) -> str:
 
 
 def end_children(children: Iterable[Child]) -> None:
-    """Terminate children; kill those still alive after the grace period."""
+    """Terminate children, and kill those alive after the grace period."""
     several = list(children)
     for child in several:
         child.terminate()

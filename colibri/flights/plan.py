@@ -88,10 +88,9 @@ class FlightPlan:
         """Return the plan of a flight; without `contents`, files are read.
 
         Raises:
-            PlanError: Options cannot be combined, or a vehicle has no sensors or ground for feedback from sensors.
-            EventError: The flight cannot have an event.
-            LinkError: The URL of a ground station is invalid, or reachable from the network without a key.
+            PlanError, EventError, LinkError: Options cannot be combined.
             ProfileError, VehicleError, TrackError: A file is invalid, or the vehicle cannot fly so.
+
         """
         checked("spec", spec, FlightSpec, "a FlightSpec, as of FlightSpec.of", PlanError)
         if spec.gcs and spec.link != "udp":

@@ -38,9 +38,9 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     Attributes:
         profile: With the law, solver and delay of the options.
-        law: Origin of the control law.
         plant_vehicle: Without the parts left out.
         sha256: Hash of each of these without names, and of all of them as `all`.
+
     """
 
     colibri: str

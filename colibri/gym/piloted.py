@@ -110,7 +110,8 @@ class PilotedEpisodes(Episodes):
     def _in_step(self, profile: Profile) -> Profile:
         """Return the profile with a control interval that divides that of the actions, as close as possible to its own.
 
-        Between two control samples there is a frame for the estimator, and none without one.
+        Only the estimator has a frame between two control samples.
+
         """
         law, interval_ms = profile.controller, round(self.interval_s * 1e3)
         own_s = profile.table(law).get("control_interval_s", 1.0)
@@ -175,7 +176,7 @@ class PilotedEpisodes(Episodes):
         self._look()
 
     def _move(self, shift: Array) -> None:
-        """Move the reference so that the settled vehicle is at `shift` from its start."""
+        """Move the reference: the settled vehicle is then at `shift` from its start."""
         self._shift = shift
         self.reference = self._track.copy()
         self.reference[:, :3] -= shift

@@ -9,10 +9,10 @@ if TYPE_CHECKING:
     from colibri.sitl.backends.setting import Setting as Setting
     from colibri.sitl.backends.setting import SettingError as SettingError
     from colibri.sitl.errors import SitlError as SitlError
-    from colibri.sitl.fleet import Fleet as Fleet
     from colibri.sitl.flight_record import Record as Record
     from colibri.sitl.ground_station import RefusedError as RefusedError
     from colibri.sitl.ground_station import Station as Station
+    from colibri.sitl.session import Fleet as Fleet
     from colibri.sitl.session import Flights as Flights
     from colibri.sitl.stepping import NotInTimeError as NotInTimeError
     from colibri.sitl.vehicle import Sitl as Sitl

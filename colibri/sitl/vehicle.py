@@ -60,7 +60,8 @@ class Links(NamedTuple):
 
     Attributes:
         ground: Between the vehicle and all ground stations, in simulated time.
-        plant: Between plant and autopilot. The flight stays the same: the plant repeats its frame until it is answered.
+        plant: Between plant and autopilot; the flight stays the same, as frames are repeated.
+
     """
 
     ground: Trouble

@@ -101,7 +101,6 @@ Shown: TypeAlias = tuple[Callable[[float], None], Callable[[str], None], Callabl
 
 @contextmanager
 def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
-    """Yield functions that show the simulated time, a line, and the number of functions compiled."""
     if quiet:
         yield unseen, unseen, unseen
         return

@@ -1,7 +1,8 @@
 """A process that loads plant and autopilot, then forks one or the other on request.
 
-A request is a line on standard input, a JSON list: "start", the package, an output file and the specification as JSON;
-or "code" or "kill" and a process id. The answer is a line: the process id, its exit code, or null.
+A request is a line of JSON on standard input: ["start", package, output file, specification], ["code", process id] or
+["kill", process id]. The answer is a line: the process id, its exit code, or null.
+
 """
 
 import gc

@@ -127,12 +127,12 @@ class Instant(NamedTuple):
 
 
 class LockstepSession:
-    """A flight that is stepped.
+    """A flight that is stepped; `truth` is the true state now.
 
     Attributes:
-        truth: True state now.
         acks: Answers of the plant to commands: number and MAV_RESULT.
         trouble: Faults of the link between plant and autopilot.
+
     """
 
     def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, rotors: int, seed: int = 0) -> None:

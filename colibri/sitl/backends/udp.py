@@ -162,7 +162,7 @@ def received(link: UdpLink, child: LoggedChild) -> tuple[bytes, Address]:
 
 
 def _meet(link: UdpLink, child: LoggedChild, expected: Callable[[bytes], bool]) -> bytes:
-    """Bind a link to the first sender of what is expected, and return that; other senders are nobody's."""
+    """Bind a link to the first sender of what is expected, and return that."""
     while True:
         datagram, address = received(link, child)
         if expected(datagram):

@@ -1,8 +1,7 @@
 import pytest
 
 from colibri.sitl.backends.setting import Setting, SettingError
-from colibri.sitl.fleet import Fleet, begin_fleet
-from colibri.sitl.session import Flights
+from colibri.sitl.session import Fleet, Flights, begin_fleet
 
 
 def test_all_fly_as_long_whoever_is_flown() -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import nan
 
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
-from colibri.sitl.fleet import Fleet
+from colibri.sitl.session import Fleet
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.scenario import FleetScenario
 
