@@ -1,4 +1,4 @@
-"""Build hook: refuse a checkout without symbolic links, whose wheel would lack half of the package."""
+"""Build hook: refuse a checkout without symbolic links."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ LINKED = ("autopilot", "common", "mavlink", "plant")
 
 
 class WholeCheckout(BuildHookInterface[Any]):
-    """Hatchling calls `initialize` before it builds a wheel, an editable one too, or a source distribution."""
+    """Hatchling calls `initialize` before each build."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         for name in LINKED:

@@ -23,7 +23,7 @@ NAVIGATION = 9
 
 
 class Errors(NamedTuple):
-    """True minus estimated position, m, velocity, m/s, ENU, and attitude, rad, body, with covariance (9, 9)."""
+    """True minus estimated position, m, velocity, m/s, ENU, and attitude, rad, body; covariance (9, 9)."""
 
     error: Array
     covariance: Array
@@ -35,7 +35,7 @@ class Errors(NamedTuple):
 
 
 def bounds(numbers: int, flights: int, level: float = 0.95) -> tuple[float, float]:
-    """Return bounds of the mean of χ² with `numbers` degrees of freedom over `flights`."""
+    """Return bounds of the mean of χ² over `flights`."""
     from scipy.special import chdtri  # slow to load, and scipy.stats, which has it too, slower: a report does without
 
     lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
@@ -44,7 +44,7 @@ def bounds(numbers: int, flights: int, level: float = 0.95) -> tuple[float, floa
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
 MEASURED = KINDS
-"""Number of components of each kind of measurement; a vehicle need not have all."""
+"""Components of each kind of measurement."""
 _UPPER = np.triu_indices(NAVIGATION)
 _COVARIANCE = slice(11, 56)
 
@@ -54,9 +54,9 @@ class Estimation(NamedTuple):
 
     Attributes:
         position_m, attitude_rad: Estimated minus true, ENU and roll, pitch, yaw, (3, n).
-        control_m: Distance of the estimate from the reference, (n,).
-        nees: Position, velocity and attitude together, (m,).
-        nis, accepted: Cumulative NIS and number of innovations, a row for each of `kinds`, (k, m).
+        control_m: Distance from the reference, (n,).
+        nees: Of position, velocity and attitude, (m,).
+        nis, accepted: Cumulative NIS and innovations by `kinds`, (k, m).
     """
 
     position_m: Array
@@ -68,7 +68,7 @@ class Estimation(NamedTuple):
     kinds: tuple[str, ...]
 
     def figures(self) -> dict[str, Any]:
-        """Return RMS values, mean NEES, and mean NIS over its degrees of freedom."""
+        """Return RMS values, and mean NEES and NIS."""
         if not len(self.control_m) or not len(self.nees):
             return dict.fromkeys(FIGURES)
         x, y, z = self.position_m
@@ -91,7 +91,7 @@ class Estimation(NamedTuple):
 
 
 def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estimation:
-    """Compare estimate and filter of a flight, from `start_s` on, with the truth."""
+    """Compare estimate and filter from `start_s` on with the truth."""
     errors = _read_errors(plan, log, start_s)
     if not errors.size and not any(_beside_truth(log, ESTIMATE, -np.inf)):
         raise RecordingError("the flight ended before there was an estimate")
@@ -114,7 +114,7 @@ def _read_errors(plan: FlightPlan, log: TopicReader, start_s: float) -> Array:
 
 
 def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
-    """Return the NEES of each check, and some of its columns, (1 + columns, m)."""
+    """Return the NEES of each check, and some columns, (1 + columns, m)."""
     parts = [np.empty((1 + len(columns), 0))]
     for checks, truth in _beside_truth(log, FILTER, start_s):
         nees = [_errors(check, true).nees() for check, true in zip(checks, truth, strict=True)]
@@ -123,7 +123,7 @@ def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
 
 
 def _beside_truth(log: TopicReader, topic: Topic, start_s: float) -> Iterator[tuple[Array, Array]]:
-    """Yield blocks of a topic and of the truth at the same instants, from `start_s` on."""
+    """Yield blocks of a topic and of the truth at the same instants."""
     (said_s,), (true_s,) = (read_series(log, each, "t") for each in (topic, TRUTH))
     late = said_s >= start_s
     truth = Rows(log, TRUTH, at_times(true_s, said_s[late]))

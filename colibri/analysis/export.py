@@ -1,4 +1,4 @@
-"""Export a ULog: MCAP for Foxglove, a MAT file for MATLAB and Octave, or a table of each topic as CSV or Parquet."""
+"""Export a ULog as MCAP, as MAT file, or as a table of each topic."""
 
 import csv
 import re
@@ -43,7 +43,7 @@ class ExportError(Error):
 
 
 class _Bounded(BufferedReader):
-    """A file with fewer reads than bytes: at the end of a damaged one, pyulog goes back again and again."""
+    """A file with fewer reads than bytes: pyulog would read a damaged end forever."""
 
     _reads = 0
 
@@ -67,7 +67,7 @@ def read_log(log: Path) -> "ULog":
 
 
 def write_mcap(log: "ULog", path: Path) -> Path:
-    """Write all topics as JSON messages with their schemas, status texts as `foxglove.Log`."""
+    """Write topics as JSON with schemas, status texts as `foxglove.Log`."""
     with _needed("mcap", "export"):
         from mcap.writer import Writer
     with path.open("wb") as file:
@@ -172,7 +172,7 @@ def _texts(log: "ULog", channel: int) -> Iterator[tuple[int, int, Any]]:
 
 
 def _tree(names: dict[str, Any]) -> dict[str, Any]:
-    """Return the places of columns such as `esc[0].esc_rpm` as nested objects."""
+    """Return columns such as `esc[0].esc_rpm` as nested objects."""
     tree: dict[str, Any] = {}
     for place, name in enumerate(names):
         *above, last = re.findall(r"[^.\[\]]+", name)
@@ -206,7 +206,7 @@ _MOST_LETTERS = 63
 
 
 def write_mat(log: "ULog", path: Path, to: Path) -> Path:
-    """Write the log read from `path`: Colibri's own topics by the names of their tables, `t` in s; others as logged."""
+    """Write the log of `path`: Colibri's own topics by the names of their tables, others as logged."""
     from scipy.io import savemat  # slow to load
 
     own = {topic.name for topic in FLIGHT_TOPICS}

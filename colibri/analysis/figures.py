@@ -1,4 +1,4 @@
-"""The figures of a flight: their contents as data, and one function for each kind of plot."""
+"""Figures of a flight: contents as data, and a function for each kind."""
 
 import gc
 import signal
@@ -25,7 +25,7 @@ from colibri.flights.plan import FlightPlan
 GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _WIDTH_IN, _DPI = 8.6, 150
 TOP_IN = 0.8
-"""Room above the axes for a title and one row of a legend."""
+"""Room for a title and a row of a legend."""
 _LEFT_IN, _RIGHT_IN, _BOTTOM_IN = 0.85, 0.25, 0.5
 _ROW_IN, _ROW_GAP_IN, _COLUMN_GAP_IN = 1.4, 0.2, 0.95
 _TITLE_IN, _LABEL_IN = 0.45, 0.6
@@ -35,7 +35,7 @@ _NOTHING = 1e-12
 _PLAIN = (-2, 4)
 """Powers of ten written without exponent."""
 _PNG_LEVEL = 3
-"""Half of the time of the usual level 6, and files larger by some percent."""
+"""Takes half of the time of the usual 6."""
 _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
@@ -61,7 +61,7 @@ AXES = (Style("#0072B2", 4.0), Style("#E69F00", 2.4), Style("#000000", 1.0))
 
 
 class Curve(NamedTuple):
-    """One series in a panel; a `held` one keeps each value from the previous sample to its own, as inputs do."""
+    """A series; a `held` one keeps each value since the previous sample."""
 
     series: str
     label: str
@@ -87,7 +87,7 @@ class TimeFigure(NamedTuple):
 
 
 def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
-    """Write the figures of a flight to its folder, half of them by a second process where this one may be forked."""
+    """Write a flight's figures, half of them by a fork where possible."""
     figures, other = figures_of(flown, plan), None
     own, others = list(figures)[::2], list(figures)[1::2]
     if can_fork():
@@ -140,13 +140,13 @@ def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
 
 
 def followed(name: str, quantity: str, *, held_reference: bool = False) -> Panel:
-    """Return the panel of a series above its reference, named `<name>_ref`."""
+    """Return a series above its reference, `<name>_ref`."""
     return Panel(quantity, (Curve(f"{name}_ref", "reference", REFERENCE, held_reference), Curve(name, "flown")))
 
 
 ANGLES = [followed(name, f"{sign} (°)", held_reference=True) for name, sign in zip(ATTITUDE, "φθψ", strict=True)]
 INPUTS = [Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT]
-"""Panels of every flight: attitude with its reference, and thrust and moments."""
+"""Panels of every flight."""
 
 
 def beside(panels: Iterable[Panel], span_s: tuple[float, float] | None) -> tuple[tuple[Panel, ...], ...]:
@@ -179,7 +179,7 @@ def draw_trajectory(series: Series, title: str) -> Figure:
 
 
 def shortened(name: str) -> str:
-    """Cut the middle of a name too long for a title."""
+    """Cut the middle of a long name."""
     half = _MAX_NAME_CHARS // 2
     return name if len(name) <= _MAX_NAME_CHARS else f"{name[:half]}…{name[-half:]}"
 
@@ -250,7 +250,7 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
 
 
 class PlainTicks(ScalarFormatter):
-    """Typesets the common power of ten alone: as formulas, all labels would take a fifth of a figure's time."""
+    """Typesets the common power of ten alone, five times as fast as all labels."""
 
     def get_offset(self) -> str:
         self.set_useMathText(True)

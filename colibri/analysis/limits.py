@@ -1,4 +1,4 @@
-"""`--fail-above` and `--fail-lost`: limits on reports and on lost flights, for continuous integration."""
+"""`--fail-above` and `--fail-lost`, for continuous integration."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ KEYS = (
     *("qp_iterations.mean", "qp_iterations.p99", "qp_iterations.max"),
     *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
 )
-"""Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is their sum."""
+"""Numbers of `report.json` that may have a limit; `fallbacks` is a sum."""
 
 
 class ReportLimit(NamedTuple):
@@ -38,7 +38,7 @@ class ReportLimit(NamedTuple):
 
 
 class LossLimit(NamedTuple):
-    """Most flights that may be lost or refused, a number or a percentage of all."""
+    """Most flights that may be lost or refused, or their percentage."""
 
     most: float
     percent: bool = False
@@ -59,7 +59,7 @@ def loss_limit(text: str) -> LossLimit:
 
 
 def loss_exceeds(limit: LossLimit | None, lost: int, flights: int) -> str:
-    """Describe how many flights are lost if too many are; without a limit, if all are."""
+    """Describe the loss of too many flights; without a limit, of all."""
     if limit is None:
         return f"all {flights} flights were lost or refused" if lost == flights else ""
     most = limit.most * flights / 100.0 if limit.percent else limit.most
@@ -87,14 +87,14 @@ def exceeded(limits: Iterable[ReportLimit], report: Mapping[str, Any]) -> list[s
 
 
 def above(limit: ReportLimit, flown: float | None) -> str:
-    """Describe a number above its limit, or unknown; empty if it is neither."""
+    """Describe a number above its limit, or unknown."""
     if flown is None:
         return f"{limit.key} is missing in this flight; its limit is {limit.value:g}"
     return "" if flown <= limit.value else f"{limit.key} is {flown:.4g}, above {limit.value:g}"
 
 
 def of_report(report: Mapping[str, Any], key: str) -> Any:
-    """Return a number of a report, or the sum of a table."""
+    """Return a number, or the sum of a table."""
     found: Any = report
     for part in key.split("."):
         found = None if found is None else found.get(part)

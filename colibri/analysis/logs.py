@@ -15,9 +15,9 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 _AT_ONCE = 4096
 _MOST = 1e30
-"""Powers of the values that analysis takes are finite up to there."""
+"""Powers of such values are finite."""
 _FINITE = {TRUTH.name: list(range(18)), DECISION.name: [*range(6), *range(10, 14)]}
-"""Columns that are finite in every flight: states and rotor speeds, references and codes."""
+"""Columns that are always finite."""
 _NUMBERS = msgspec.json.Encoder()
 
 
@@ -34,7 +34,7 @@ def log_of(folder: Path) -> FlightFile:
 
 
 def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None = None) -> Iterator[Array]:
-    """Yield the rows of a topic, or the masked ones, in blocks (k, columns), k > 0."""
+    """Yield rows, or masked ones, in blocks (k, columns), k > 0."""
     first = 0
     for block in log.blocks(topic):
         if wanted is not None:
@@ -47,7 +47,7 @@ def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None
 
 
 def _check(topic: Topic, block: Array) -> None:
-    """Refuse rows without a state or decision: the file is damaged, or the flight diverged."""
+    """Refuse rows of a damaged file or a diverged flight."""
     sound = (np.abs(block[:, _FINITE.get(topic.name, [0])]) < _MOST).all(axis=1)
     if not sound.all():
         row = int(np.argmin(sound))
@@ -62,7 +62,7 @@ def read_series(log: TopicReader, topic: Topic, *columns: str) -> list[Array]:
 
 
 def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
-    """Return the mask of times that are, to the microsecond, among sorted instants, (n,)."""
+    """Return which times are, to the microsecond, among sorted instants, (n,)."""
     instants_us = np.append(instants_s, np.nan)
     np.round(np.multiply(instants_us, 1e6, out=instants_us), out=instants_us)
     found = np.empty(len(times_s), dtype=np.bool_)
@@ -74,7 +74,7 @@ def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
 
 
 def csv_rows(table: Array) -> bytes:
-    """Encode rows with every bit; JSON is much faster than `repr`, but has only finite numbers."""
+    """Encode rows exactly; JSON is faster than `repr`, but only finite."""
     rows = table.tolist()
     if np.isfinite(table).all():
         return _NUMBERS.encode(rows)[2:-2].replace(b"],[", b"\n") + b"\n"

@@ -14,12 +14,12 @@ from colibri.plant.vehicle.description import Vehicle
 LOST_M = 5.0
 """A settled vehicle further from its reference is lost."""
 _TOUCHED_S = 1.0
-"""Longest contact with the ground below the reference before the vehicle counts as lost."""
+"""Longest contact with the ground below the reference."""
 _LAST_PART = 2.0 / 3.0
 LIMIT_CYCLE_RAD_S = 1.5
-"""A swing above it is a limit cycle: vehicles swing at 3 to 8 rad/s if their rotors are much slower than assumed."""
+"""A swing above it is a limit cycle; slow rotors cause 3 to 8 rad/s."""
 _TURNING_S = 1.0
-"""A vehicle that begins upside down may be so again during its recovery."""
+"""A recovery may be upside down for so long."""
 _INSTANT_S = 1e-6
 
 
@@ -34,7 +34,7 @@ def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
     """Judge a completed flight; one under ground stations is never lost.
 
     A vehicle is lost if it lies or drags along the ground below its reference, ends upside down, or is further than
-    `LOST_M` from its reference once settled; in a shorter flight, if it ends that much further away than it began.
+    `LOST_M` from its reference once settled; in a short flight, if it ends that much further away than it began.
     """
     if plan.spec.gcs:
         return None
@@ -59,7 +59,7 @@ def ground_contact_s(vehicle: Vehicle, flight: FlightSeries) -> float | None:
 
 
 def ground_hits(vehicle: Vehicle, flight: FlightSeries) -> int | None:
-    """Return how often the vehicle came down on the ground below a reference in the air."""
+    """Count contacts with the ground below a reference in the air."""
     if vehicle.ground is None:
         return None
     hits = _touches_again(flight) & flight.aloft
@@ -67,13 +67,13 @@ def ground_hits(vehicle: Vehicle, flight: FlightSeries) -> int | None:
 
 
 def limit_cycle_rad_s(flight: FlightSeries) -> float | None:
-    """Return the swing of the thrust axis over the last third: the median of that in each second, RMS."""
+    """Return the swing of the thrust axis over the last third: the median RMS of a second."""
     swings = [swing for at_s, swing in flight.swings_rad_s.items() if at_s > _LAST_PART * flight.t[-1]]
     return float(np.median(swings)) if swings else None
 
 
 def impact(flight: FlightSeries) -> str | None:
-    """Describe the hardest contact with the ground after the first lift-off, if it is no landing."""
+    """Describe the hardest contact with the ground that is no landing."""
     down = _touches_again(flight)
     speeds = {at: speed for at, speed in flight.contact_speed_m_s.items() if down[at + 1]}
     hard = [at for at, speed in speeds.items() if speed > HARD_M_S or flight.upright[at] < HARD_UP]

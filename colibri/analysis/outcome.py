@@ -1,4 +1,4 @@
-"""Results of a flight: `flight.csv` and `report.json`, or a report in memory."""
+"""Results of a flight, in files or in memory."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -26,7 +26,7 @@ TABLE, REPORT = "flight.csv", "report.json"
 
 
 class Outcome(NamedTuple):
-    """Result of a flight; `report` is `None` before its first control sample, `error` the cause of an early end."""
+    """A result; `report` is `None` before the first control sample, `error` ended the flight early."""
 
     report: Report | None
     log: TopicReader

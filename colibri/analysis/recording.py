@@ -1,4 +1,4 @@
-"""Truth and decisions of a flight, joined into one row for each control sample."""
+"""Truth and decisions of a flight, joined at control samples."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -29,7 +29,7 @@ ATTITUDE_REFERENCE = ("phi_ref", "theta_ref", "psi_ref")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")
 POSITION_REFERENCE = ("x_ref", "y_ref", "z_ref")
 SETTLED_AFTER_S = 20.0
-"""From then on the start of a flight no longer counts."""
+"""From then on its start no longer counts."""
 COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENCE)
 _MORE_ROTORS = MORE_TRUTH.names[1:]
 
@@ -42,15 +42,15 @@ _nearest_turn = compiled(rotations.nearest_turn)
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Consecutive control samples of a flight, one row each; the m decisions led to all rows but the first.
+    """Consecutive control samples of a flight; the m decisions led to all rows but the first.
 
     Attributes:
-        table: Columns as in `COLUMNS`, then those of more than four rotors, (n, 27 or more). A row holds the state at
-            its time, the inputs that led to it, and their references; the first row of a flight is the start.
-        qp_status: Result of each QP, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,).
-        fallback: Source of a decision, as in `colibri.autopilot.control.interface.FALLBACK_CODES`, (m,).
-        slack: Planned excess of soft limits, in units of each limit, (m,).
-        active: Active constraints of each kind, as in `interface.Active`, (m, 4).
+        table: Columns as in `COLUMNS`, then those of more than four rotors, (n, 27 or more): a row holds the state at
+            its time, the inputs that led to it, and their references.
+        qp_status: As in `colibri.autopilot.control.interface.STATUS_CODES`, (m,).
+        fallback: Source of a decision, as in `FALLBACK_CODES` there, (m,).
+        slack: Planned excess of soft limits, in units of each, (m,).
+        active: Active constraints of each kind, as in `Active` there, (m, 4).
         qp_iterations: nan if unknown, (m,).
     """
 
@@ -73,18 +73,18 @@ class Samples:
 
     @property
     def position_error_m(self) -> Array:
-        """Distance to the reference of the same instant or path time, (n,)."""
+        """Distance to the reference of the instant or path time, (n,)."""
         error: Array = np.linalg.norm(self.columns(("x", "y", "z")) - self.columns(POSITION_REFERENCE), axis=1)
         return error
 
 
 @dataclass(frozen=True, slots=True)
 class Recording(Samples):
-    """A flight in memory: 0.04 MB a simulated second at 125 Hz, twice that during reading.
+    """A flight in memory, 0.04 MB a simulated second at 125 Hz.
 
     Attributes:
-        path_lag_s: Last lag of path time; `None` for a control law on the clock.
-        trajectory_sha256: Hash of the plant's states at every frame, as float64.
+        path_lag_s: Last lag of path time; `None` on the clock.
+        trajectory_sha256: Hash of the plant's states at every frame, float64.
     """
 
     path_lag_s: float | None
@@ -92,7 +92,7 @@ class Recording(Samples):
 
 
 class Lags(NamedTuple):
-    """Lag of path time behind the clock at each decision, s, (m,); nan for a control law on the clock."""
+    """Lag of path time at each decision, s, (m,); nan on the clock."""
 
     decided_s: Array
     lag_s: Array
@@ -102,10 +102,10 @@ class Lags(NamedTuple):
 
 
 class FlightReader:
-    """Joins truth and decisions of a flight part by part, in some MB of memory."""
+    """Joins truth and decisions part by part, in some MB."""
 
     def __init__(self, plan: FlightPlan, log: TopicReader | None = None) -> None:
-        """Read the times that join them; the default log is in the plan's folder.
+        """Read the times that join them, by default from the plan's folder.
 
         Raises:
             RecordingError: The log lacks a complete control sample.
@@ -192,7 +192,7 @@ def read_lags(log: TopicReader) -> Lags:
 
 
 def path_times(times_s: Array, lags: Lags) -> Array:
-    """Return the path times of some times, s, with the lag of the last decision."""
+    """Return path times, s, with the lag of the last decision."""
     rows = np.searchsorted(lags.decided_s, times_s + _SAME_S) - 1
     times: Array = times_s - np.nan_to_num(lags.lag_s[np.maximum(rows, 0)])
     return times
@@ -217,7 +217,7 @@ class TableWriter:
 
 
 def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:
-    """Mask of the plant's rows at control samples, plus the end of the last hold."""
+    """Mask the plant's rows at control samples and at the last one's end."""
     held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant_s[-1])
     return at_times(plant_s, np.concatenate([decided_s, held_s]))
 

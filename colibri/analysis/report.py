@@ -30,7 +30,7 @@ _INSTANT_S = 1e-6
 def report(
     plan: FlightPlan, log: TopicReader, summary: FrameCount | None, flight: FlightSeries, lost: Lost | None
 ) -> Report:
-    """Return the figures of a flight; errors are at the same instant or path time, effort is the RMS of U2..U4, N m."""
+    """Return the figures of a flight; errors are at the same instant or path time."""
     wall_time_s, frames, resent = summary or (None, None, None)
     error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])
@@ -92,7 +92,7 @@ def report(
 
 
 def _within(plan: FlightPlan, t: Array, error: Array) -> Array:
-    """Return the errors in the window of the options; none without one."""
+    """Return the errors in the window, if there is one."""
     if (window := plan.spec.window) is None:
         return error[:0]
     within: Array = error[(t >= window.begin_s - _INSTANT_S) & (t <= window.end_s + _INSTANT_S)]

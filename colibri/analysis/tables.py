@@ -13,7 +13,7 @@ _MAX_WIDTH = 400
 
 
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int, notes: Sequence[str] = ()) -> list[Path]:
-    """Write `path` with suffixes md, which has the notes, and csv, whose columns are identifiers."""
+    """Write `path` as md, with notes, and as csv, whose columns are identifiers."""
     below = "".join(f"\n{note}\n" for note in notes)
     texts = {
         "md": markdown(headings, rows, names=names) + below,

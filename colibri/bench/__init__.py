@@ -1,3 +1,3 @@
-"""Speed of Colibri: stages of a control step, flights at several rates, ground stations."""
+"""Speed of Colibri."""
 
 __all__: list[str] = []  # the command line's; nothing to import

@@ -24,7 +24,7 @@ _OF_REPORT: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 class Goal(NamedTuple):
-    """A figure of a command: `RTF`, to be exceeded, or a time, to be undercut, on two quiet cores."""
+    """A figure of a command: `RTF`, to be exceeded, or a time, to be undercut."""
 
     name: str
     options: tuple[str, ...]
@@ -55,7 +55,7 @@ def colibri_of(checkout: Path) -> Path:
 
 
 def command_figures(duration_s: float, runs: int, report: Report, against: Path | None = None) -> dict[str, Any]:
-    """Run every command, and after it that of `against`; ratios, ours to theirs, are within a run."""
+    """Run every command in turn with that of `against`; ratios are within a run."""
     ours, theirs = [sys.executable, "-m", "colibri"], against and [str(colibri_of(against))]
     here: Samples = {}
     there: Samples = {}

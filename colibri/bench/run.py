@@ -155,7 +155,7 @@ def _number(value: float) -> str:
 
 
 def _write(path: Path, text: str = "") -> None:
-    """Write a text; without one only check for permission, rather than after minutes of measurement."""
+    """Write a text; without one only check for permission."""
     try:
         with open(path, "w" if text else "a", encoding="utf-8", opener=regular) as file:
             file.write(text)

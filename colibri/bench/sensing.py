@@ -1,4 +1,4 @@
-"""Cost of sensors: a step of the estimator, and flights on sensors and on the state."""
+"""Cost of sensors: estimator steps, and flights with and without."""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -24,9 +24,9 @@ FRAME_US, CONTROL_US = 4_000, 8_000
 LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
 _MIN_S = 4.0
-"""A flight on sensors begins with a second of standing, while the estimator loads."""
+"""It begins with a second of standing."""
 _SETTLED = 500
-"""Frames left out: the estimator aligns, and its code is loaded."""
+"""Frames left out: the estimator aligns."""
 FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 

@@ -1,4 +1,4 @@
-"""Cost of ground stations: time to serve them after a frame, and the control step beside them."""
+"""Cost of ground stations after a frame, and beside a control step."""
 
 import socket
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
 
 CHANNELS = (0, 1, 2, 4, 8)
-"""Alternately a ground station's and an SDK's, with their default streams."""
+"""Alternately a ground station's and an SDK's."""
 KINDS = (GCS, SDK)
 STATIONS = 2
 ALONE, WATCHED = "alone", f"{STATIONS} stations"
@@ -54,7 +54,7 @@ def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 
 
 def served(plan: FlightPlan, channels: int) -> Figures:
-    """Fly in memory with open channels; return the time to serve them, with the log, after a frame, µs."""
+    """Fly in memory; return the time to serve the channels, with the log, after a frame, µs."""
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
     autopilot = copter_autopilot(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
     stations = autopilot.stages.stations
@@ -80,7 +80,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
 
 
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
-    """Fly as two processes at real time with connected ground stations."""
+    """Fly at real time beside ground stations."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(stations)]
         for sock in sockets:  # takes datagrams, and ignores them

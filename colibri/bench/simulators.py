@@ -1,4 +1,4 @@
-"""Time of the plant from a command of PX4 or ArduPilot to its next frame, on a link in memory."""
+"""Time from a command of PX4 or ArduPilot to the plant's next frame."""
 
 from math import inf, sqrt
 from struct import Struct
@@ -24,7 +24,7 @@ VEHICLES = {PX4: "iris", ARDUPILOT: "hummingbird"}
 FRAMES_HZ = {PX4: 250, ARDUPILOT: 1200}
 AIR: dict[str, dict[str, str]] = {"calm": {}, "moderate turbulence": {"turbulence": "moderate", "wind": "5@270"}}
 _HIGH_UP = {"z": 100.0}
-"""The rotors turn as in hover without control; a tilting vehicle must have room to fall."""
+"""A vehicle without control needs room to fall."""
 _LOADED_AFTER = 100
 _TRUTH_EVERY_US = 5e3
 """Interval that PX4 requests."""

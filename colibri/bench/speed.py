@@ -1,4 +1,4 @@
-"""Flights with variants of profile `flight`, and real-time factors at several rates, beside a peer if there is one."""
+"""Variants of profile `flight`, and real-time factors."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -54,7 +54,7 @@ _WARM_UP_S = 0.5
 
 
 class PeerSimulator(NamedTuple):
-    """Another simulator: from frame rate, Hz, and duration, s, to simulated over wall-clock time."""
+    """Another simulator: from frame rate, Hz, and duration, s, to real-time factor."""
 
     name: str
     real_time_factor: Callable[[int, float], float]
@@ -63,7 +63,7 @@ class PeerSimulator(NamedTuple):
 def rate_figures(
     profile: Profile, folder: Path, duration_s: float, runs: int, report: Report, peer: PeerSimulator | None = None
 ) -> dict[str, Any]:
-    """Fly at every rate over every link, and the peer; ratios are within a run, under the same load."""
+    """Fly at every rate over every link; ratios are within a run."""
     report("warm up")
     plan = plan_of(profile, folder, _WARM_UP_S, "memory")
     fly_plan(plan)
@@ -83,7 +83,7 @@ def rate_figures(
 
 
 def sampled(runs: int, report: Report, measures: Mapping[str, Callable[[], T]]) -> dict[str, list[T]]:
-    """Take each measure in turn, run after run, so that other load weighs on all of them."""
+    """Take measures in turn, run after run: other load weighs on all."""
     samples: dict[str, list[T]] = {name: [] for name in measures}
     for run in range(runs):
         for name, measure in measures.items():

@@ -1,4 +1,4 @@
-"""Time of each stage of a control step, measured in flight on the methods that fly."""
+"""Time of each stage of a control step, in flight."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -34,7 +34,7 @@ BLOCKS: Mapping[int, tuple[int, ...]] = {
     28: (1, 2, 3, 5, 7, 10),
     60: (1, 2, 4, 8, 15, 30),
 }
-"""Steps that each correction is held, by horizon: shorter than in profile `flight`, as there, and as in `path`."""
+"""Steps of each correction, by horizon: short, as in `flight`, and as in `path`."""
 PROFILE_HORIZON = 28
 
 _QPS = 100
@@ -149,7 +149,7 @@ def solver_figures(profile: Profile, name: str, qps: Sequence[Qp]) -> Figures:
 
 
 def exchange_times_us(frames: Sequence[bytes], commands: Sequence[bytes]) -> list[float]:
-    """Send each frame to another process, which answers with a command; return the round trips, µs."""
+    """Exchange frames for commands with another process; return round trips, µs."""
     here, there = Pipe()
     answering = get_context("spawn").Process(target=_answer_datagrams, args=(there, list(commands)), daemon=True)
     answering.start()

@@ -1,3 +1,3 @@
-"""Certificates of control laws: Lyapunov functions by semidefinite programs, checked in exact arithmetic."""
+"""Certificates of control laws, checked in exact arithmetic."""
 
 __all__: list[str] = []  # the command line's; nothing to import

@@ -33,11 +33,11 @@ MIRRORS = (
     (-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1),
     (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1),
 )
-"""Signs of the states under exchange of left and right, and of fore and aft; the rotors' momentum changes sign, too."""
+"""Signs of the states under exchange of left and right, and of fore and aft."""
 
 
 _HALF_A_TURN = 4
-"""Bound of the error of an unlimited angle, at least half a turn, rad."""
+"""Half a turn or more, rad."""
 _STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
 """phi, theta, psi, rad, to p, q, r, rad/s."""
 
@@ -47,7 +47,7 @@ Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 
 
 class CertifiedConditions(NamedTuple):
-    """Conditions of a certificate: disturbing moment, and used part of the battery's charge."""
+    """Disturbing moment, and used part of the battery's charge."""
 
     disturbance_n_m: float
     charge_part: float
@@ -90,7 +90,7 @@ class AttitudeNumbers(NamedTuple):
 
 
 class Kinematic(NamedTuple):
-    """Bounds of Φ' = T ω: vertices of T, largest |dT/dt|, and limits of the first angles, rad, rounded down."""
+    """Bounds of Φ' = T ω: vertices of T, largest |dT/dt|, and limits of the first angles, rad."""
 
     vertices: AnyArray
     max_change: AnyArray
@@ -120,7 +120,7 @@ def _of_quaternion(error: AnyArray, eta: Any) -> AnyArray:
 
 
 class VertexBox(NamedTuple):
-    """Vertices and largest entries over the ranges; `beside` is the largest |T - 1|."""
+    """Vertices and largest entries; `beside` is the largest |T - 1|."""
 
     kinematic: AnyArray
     gyroscopic: AnyArray
@@ -280,7 +280,7 @@ def _cross(a: AnyArray, b: AnyArray) -> AnyArray:
 
 
 def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
-    """Return the rows of limits; angles and rates stay away from their ends by their motion within an interval."""
+    """Return the rows of limits, less the motion within an interval."""
     if n.headroom <= 0:
         raise RangeError("the thrust uses the full range of the rotors: no moments remain")
     h, rates = n.interval_s, n.rates_rad_s

@@ -1,7 +1,4 @@
-"""The certificate of a law: Lyapunov functions, each checked in exact arithmetic, and their file.
-
-From the solver only P and the multipliers are used, as written decimals: the loop is rebuilt in fractions.
-"""
+"""Certificate of a law: Lyapunov functions, rebuilt in fractions from written decimals and checked exactly."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -28,7 +25,7 @@ def exactly(value: float) -> Fraction:
 
 
 def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False) -> float:
-    """Return the least margin of the decrease over all vertices; 0 without proof."""
+    """Return the least margin over all vertices; 0 without proof."""
     P, multipliers = _fractions(proof.P), _fractions(proof.multipliers)
     forms = supply(loop, _fractions(proof.sizes)).forms
     if (multipliers <= 0).any() or (_fractions(proof.sizes) <= 0).any() or not _mirrored(loop, P, multipliers, forms):
@@ -39,7 +36,7 @@ def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False
 
 
 def limit_margin(loop: UncertainLoop, proof: Proof) -> float:
-    """Return the least margin of the limits over the set V <= 1."""
+    """Return the least margin of the limits over V <= 1."""
     P = _fractions(proof.P)
     bordered = (np.vstack([np.column_stack([P, row]), np.append(row, _ONE)]) for row in loop.limits)
     return min(map(positive_margin, bordered))
@@ -52,7 +49,7 @@ def supply_margin(loop: UncertainLoop, proof: Proof) -> float:
 
 
 def positive_margin(M: AnyArray) -> float:
-    """Return a proven μ with M - μ diag(M) positive definite; 0 without proof."""
+    """Return a proven μ with M - μ diag(M) positive definite, else 0."""
     diagonal = np.diag(M).astype(float)
     if (diagonal <= 0.0).any():
         return 0.0
@@ -64,7 +61,7 @@ def positive_margin(M: AnyArray) -> float:
 def is_positive(M: AnyArray) -> bool:
     """Prove that M is symmetric and positive definite.
 
-    With X an approximate inverse factor, X M Xᵀ must be strictly diagonally dominant, in integers (Gershgorin).
+    With X an approximate inverse factor, X M Xᵀ is strictly diagonally dominant in integers (Gershgorin).
     """
     if not (M == M.T).all():
         return False
@@ -81,7 +78,7 @@ def is_positive(M: AnyArray) -> bool:
 
 
 def _mirrored(loop: UncertainLoop, P: AnyArray, multipliers: AnyArray, forms: AnyArray) -> bool:
-    """Whether the mirrors map the loop to itself; the inequality contains E and μ only as E diag(1 / μ) Eᵀ."""
+    """Whether the mirrors map the loop to itself; E and μ count as E diag(1 / μ) Eᵀ."""
     entered = loop.entries / multipliers[: len(forms)] @ loop.entries.T
     return all(
         (row[:, None] * matrix * row == matrix).all()
@@ -95,7 +92,7 @@ def _fractions(values: Array) -> Any:
 
 
 _WORKING_PART = 0.5
-"""Part of the largest scale: the nearer to it, the slower the decay and the smaller the set."""
+"""Part of the largest scale; near it decay is slow."""
 _DIGITS = 4
 
 
@@ -104,7 +101,7 @@ class NotCertifiedError(Error):
 
 
 class CertifiedLaw(Protocol):
-    """A law with a closed loop at any scale of its ranges."""
+    """A law with a loop at any scale of its ranges."""
 
     def numbers_at(self, scale: float) -> Any: ...
 
@@ -112,7 +109,7 @@ class CertifiedLaw(Protocol):
 
 
 class ProofEntry(NamedTuple):
-    """A proof at a scale of the ranges, with the loop's numbers and the exact check's margins."""
+    """A proof at a scale, with the loop's numbers and the margins."""
 
     scale: float
     numbers: Any
@@ -121,7 +118,7 @@ class ProofEntry(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """The proofs of a law: for the largest ranges, and at half of their scale.
+    """Proofs for the largest ranges, and at half of their scale.
 
     Attributes:
         invariant: The largest set that the disturbed loop never leaves, within all limits.
@@ -137,10 +134,10 @@ class Certificate(NamedTuple):
 
 
 def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:
-    """Certify a law and check every part; `least` is the smallest acceptable scale.
+    """Certify a law down to a scale of `least`.
 
     Raises:
-        RefusedError: A part is not proven.
+        NotCertifiedError: A part is not proven.
     """
     say("the largest ranges")
     found = lyapunov.largest_scale(lambda scale: _loop_at(law, scale), least)
@@ -168,7 +165,7 @@ def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Cert
 
 
 def margins_of(law: CertifiedLaw, name: str, numbers: Any, proof: Proof) -> dict[str, float]:
-    """Return the margins of an entry's exact check, all positive in a proof."""
+    """Return the margins of the exact check, positive in a proof."""
     loop = law.loop(numbers, exactly)
     if name in ("largest", "decay", "terminal"):
         return {"decrease": decrease_margin(loop.undisturbed(), proof, weighted=name == "terminal")}

@@ -1,6 +1,6 @@
-"""Fly the attitude's nonlinear equations under a certified law, many flights at once.
+"""Fly the attitude's nonlinear equations under a certified law.
 
-The law's own kinematics, Euler's equation with the rotors' momentum, and the lag of the moments; not the LPV model.
+They are its kinematics, Euler's equation with the rotors' momentum, and the lag of the moments.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _NO_LENGTH = 1e-12
 
 
 class FlownErrors(NamedTuple):
-    """Errors, (steps + 1, flights, 12), their V, and the largest commands beyond the gain, (3,)."""
+    """Errors, (steps + 1, flights, 12), V, and largest commands beyond the gain, (3,)."""
 
     states: Array
     values: Array
@@ -46,9 +46,9 @@ class BorderFlights(NamedTuple):
 
 
 def fly(law: PlannedAttitude, entry: ProofEntry, plan: BorderFlights) -> FlownErrors:
-    """Fly from points all over the border V = 1 to attitudes that may be held, under the largest disturbance.
+    """Fly from the border V = 1 to attitudes that may be held, under the largest disturbance.
 
-    The moment is constant, random at every sample, at the resonance, or always the worst for V.
+    The moment is constant, random, at the resonance, or the worst for V.
     """
     numbers, proof = entry.numbers, entry.proof
     flights, rng = plan.flights, np.random.default_rng(plan.seed)

@@ -56,7 +56,7 @@ class UncertainLoop(NamedTuple):
     mirrors: Array
 
     def blocks(self) -> list[list[int]]:
-        """Return groups of states to couple in P: the mean over mirror images couples no others."""
+        """Return groups of states to couple in P, by mirror images."""
         found: dict[tuple[float, ...], list[int]] = {}
         for state, signs in enumerate(self.mirrors.T.tolist()):
             found.setdefault(tuple(signs), []).append(state)
@@ -95,7 +95,7 @@ def _key(A: AnyArray) -> Any:
 
 
 def supply(loop: UncertainLoop, sizes: AnyArray) -> Supply:
-    """Return the quadratic bounds on ξ; tight for |Y z| in proportion to `sizes`, (k,)."""
+    """Return the quadratic bounds on ξ, tight for |Y z| in proportion to `sizes`, (k,)."""
     totals = loop.gains @ sizes + loop.offsets
     weights = loop.gains / sizes
     Y = loop.channels
@@ -104,7 +104,7 @@ def supply(loop: UncertainLoop, sizes: AnyArray) -> Supply:
 
 
 def congruent(P: AnyArray, X: AnyArray) -> AnyArray:
-    """Return XᵀPX; fractions over a common denominator are a hundred times faster."""
+    """Return XᵀPX; fractions are faster over a common denominator."""
     if P.dtype != object:
         product: AnyArray = X.T @ P @ X
         return product
@@ -115,7 +115,7 @@ def congruent(P: AnyArray, X: AnyArray) -> AnyArray:
 
 
 def whole(matrix: AnyArray) -> tuple[AnyArray, int]:
-    """Return a matrix of fractions as integers, and the common denominator."""
+    """Return integers and the common denominator."""
     below = lcm(*(entry.denominator for entry in matrix.ravel()))
     return np.vectorize(lambda entry: int(entry * below), otypes=[object])(matrix), below
 
@@ -125,8 +125,8 @@ def decrease(
 ) -> AnyArray:
     """Return a matrix whose positive semidefiniteness proves a decrease of V = zᵀPz (S-procedure).
 
-    V[k+1] <= ratio V[k] - zᵀ stage z + Σ_i multipliers_i g_i + that of w; linear in P and the multipliers. The vertices
-    prove it for their hull, since V is convex.
+    V[k+1] <= ratio V[k] - zᵀ stage z + Σ_i multipliers_i g_i + that of w; linear in P and the multipliers. V is
+    convex, so vertices prove it for their hull.
     """
     n, m = len(P), len(forms)
     moved = np.hstack([A, loop.entries, loop.disturbance])

@@ -1,4 +1,4 @@
-"""Quadratic Lyapunov functions of an uncertain loop, each by one semidefinite program, solved by Clarabel.
+"""Quadratic Lyapunov functions of an uncertain loop, by semidefinite programs.
 
 Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, ch. 5 and 6.
 """
@@ -18,7 +18,7 @@ from colibri.common.types import Array
 _MAX_ROUNDS = 40
 _ADDED = 5
 _ENOUGH = 5e-8
-"""Tolerance of an inequality's least eigenvalue: less than the margin of `lyapunov`."""
+"""Tolerance of an inequality's least eigenvalue."""
 _USABLE = ("Solved", "AlmostSolved", "InsufficientProgress")
 """Statuses that may come with a solution; a check decides."""
 
@@ -31,9 +31,9 @@ class Inequality(NamedTuple):
 
 
 def minimise(cost: Array, always: Sequence[Inequality], many: Inequality | None = None) -> Array | None:
-    """Return the x of least cost under all inequalities; `None` if Clarabel finds no solution.
+    """Return the x of least cost; `None` if Clarabel finds none.
 
-    `many` is a stack of inequalities of one size, added as they are violated: few of them bind.
+    `many` is a stack of inequalities, added as they are violated: few bind.
     """
     total = 0 if many is None else len(many.constant)
     taken = list(range(0, total, max(1, total // _ADDED)))
@@ -65,7 +65,7 @@ def _solve(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
 
 
 def _vectors(matrices: Array) -> Array:
-    """Return the upper triangles of (..., k, k), column by column, off-diagonals times √2."""
+    """Return the upper triangles of (..., k, k), by columns, off-diagonals times √2."""
     columns, rows = np.tril_indices(matrices.shape[-1])
     vectors: Array = matrices[..., rows, columns] * np.where(rows == columns, 1.0, np.sqrt(2.0))
     return vectors
@@ -76,11 +76,11 @@ _LEAST_MARGIN = 1e-6
 _BISECTIONS = 6
 _SET_RATIOS = (0.98, 0.95, 0.99)
 _ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)
-"""Ratios of V between samples, in order of trial. Slower gives larger sets, faster smaller."""
+"""Ratios of V, in order of trial: larger sets, then faster."""
 _STAGE_BESIDE = 1e-6
-"""Part of the limits, so that a weight covers states without stage cost."""
+"""Covers states without stage cost."""
 _ROUNDING = 1e-6
-"""Positive definiteness demanded beyond zero, for the solver's errors of up to about 1e-7."""
+"""Covers the solver's errors of up to about 1e-7."""
 _SPARE = 1e-4
 """Relative margin of all constraints, for the solver's errors."""
 
@@ -94,7 +94,7 @@ class Proof(NamedTuple):
     ratio: float
 
     def reach(self, rows: Array) -> Array:
-        """Return the largest f z of each row f, (l, n), in the set V <= 1."""
+        """Return the largest f z of rows f, (l, n), where V <= 1."""
         reached: Array = np.sqrt(np.einsum("li,ij,lj->l", rows, np.linalg.inv(self.P), rows))
         return reached
 
@@ -174,7 +174,7 @@ class _Problem:
 
 
 def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
-    """Find a Lyapunov function that decreases by `ratio` each sample, without disturbance."""
+    """Find a decrease by `ratio` each sample, without disturbance."""
     C = _coordinates_of_set(loop)
     if C is None or spectral_radius(loop) ** 2 >= ratio:
         return None
@@ -195,7 +195,7 @@ def spectral_radius(loop: UncertainLoop) -> float:
 
 
 def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float) -> tuple[float, Proof] | None:
-    """Find the largest scale of the ranges, by bisection: smaller boxes lie in larger ones."""
+    """Find the largest scale of the ranges, by bisection."""
 
     def found_at(scale: float) -> Proof | None:
         loop = loop_at(scale)
@@ -205,7 +205,7 @@ def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float
 
 
 def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) -> tuple[float, Proof] | None:
-    """Return the value nearest to `bad` with a proof; `None` if even `good` lacks one."""
+    """Return the value nearest to `bad` with a proof, if any."""
     best = find(good)
     if best is None:
         return None
@@ -217,17 +217,17 @@ def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) ->
 
 
 def invariant_set(loop: UncertainLoop) -> Proof | None:
-    """Find the largest set V <= 1 that the disturbed loop never leaves, within all limits."""
+    """Find the largest set V <= 1 that is never left, within all limits."""
     return _first(loop, _SET_RATIOS, _set_program)
 
 
 def attractor(loop: UncertainLoop) -> Proof | None:
-    """Find the smallest set V <= 1 that every disturbed trajectory tends to."""
+    """Find the smallest set V <= 1 that trajectories tend to."""
     return _first(loop, _ATTRACTOR_RATIOS, _attractor_program)
 
 
 def terminal_weight(loop: UncertainLoop) -> Proof | None:
-    """Find the least S with a decrease of zᵀSz by the stage cost, without disturbance."""
+    """Find the least S with a decrease of zᵀSz by the stage cost."""
     C = _coordinates(loop, loop.stage + _STAGE_BESIDE * np.diag(np.diag(loop.limits.T @ loop.limits)))
     if C is None:
         return None
@@ -254,7 +254,7 @@ def _first(
     ratios: tuple[float, ...],
     program: Callable[[_Problem, float], tuple[Array, list[Inequality]]],
 ) -> Proof | None:
-    """Solve for the first feasible ratio, and again in coordinates with its set as a ball."""
+    """Solve for the first feasible ratio, then again with its set as a ball."""
 
     def solved(C: Array | None, ratio: float) -> Proof | None:
         if C is None or spectral_radius(loop) ** 2 >= ratio:
@@ -270,7 +270,7 @@ def _first(
 
 
 def _coordinates(loop: UncertainLoop, weight: Array) -> Array | None:
-    """Return C: V = |C z|² decreases by zᵀ weight z in the polytope's middle; `None` if it is unstable."""
+    """Return C: V = |C z|² decreases by zᵀ weight z in the polytope's middle, if stable."""
     middle = loop.vertices.mean(axis=0)
     radius = float(np.abs(np.linalg.eigvals(middle)).max())
     if radius >= 1.0:
@@ -288,7 +288,7 @@ def _coordinates_of_set(loop: UncertainLoop) -> Array | None:
 
 
 def _root(P: Array, loop: UncertainLoop) -> Array | None:
-    """Return C with CᵀC = P; `None` unless P is positive definite."""
+    """Return C with CᵀC = P, if P is positive definite."""
     C = np.zeros_like(P)
     for block in loop.blocks():
         part = np.ix_(block, block)

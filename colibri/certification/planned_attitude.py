@@ -1,8 +1,7 @@
-"""The attitude under `lpv-mpc` without binding limits: the gain of its QP, read from the law itself.
+"""The attitude under `lpv-mpc` without binding limits, with the gain of its QP.
 
-The minimum of the QP is a function of attitude error, rates, rotor speeds and the last plan's correction for this
-sample. Its derivative at rest, level, in hover, is the certified gain; its small dependence on attitude and thrust is a
-remainder.
+The minimum of the QP is a function of attitude error, rates, rotor speeds and the last plan's correction. Its
+derivative at rest, level, in hover, is the certified gain; its dependence on attitude and thrust is a remainder.
 """
 
 from itertools import product
@@ -46,17 +45,17 @@ _MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
 _STEP = 1e-4
 """Step of a derivative, rad, rad/s and N m."""
 _SPARED = 0.2
-"""Part of the thrust's squared speed that moments leave to every rotor."""
+"""Squared speed that moments leave to every rotor."""
 HELD_RAD = radians(20.0)
-"""Largest held |phi| and |theta|: the gain depends on phi, as the heading has its own weight."""
+"""Largest held |phi| and |theta|."""
 _GRID = 4
 _BETWEEN = 1.5
-"""Difference of the gain anywhere over the largest on a grid."""
+"""Difference anywhere over the largest on a grid."""
 _ETA_SPARE = 1e-9
 
 
 class PlannedAttitude:
-    """The unconstrained attitude law of a profile; C as in `AttitudeNumbers`."""
+    """An unconstrained attitude law; C as in `AttitudeNumbers`."""
 
     what = "unconstrained attitude law of lpv-mpc"
     axes = ("about x", "about y", "about z")
@@ -96,7 +95,7 @@ class PlannedAttitude:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
-        """Return the range of the thrust at a scale of the ranges."""
+        """Return the range of the thrust at a scale."""
         (low, hover, high), part = self.thrust_n, self.thrust_part * scale
         return hover - part * (hover - low), hover + part * (high - hover)
 
@@ -184,7 +183,7 @@ class PlannedAttitude:
         return squared
 
     def _gain(self, phi: float, thrust_n: float) -> Array:
-        """Return the derivative at rest of commanded and remembered moments, (2, 3, 12)."""
+        """Return the gain of commanded and remembered moments, (2, 3, 12)."""
         columns = []
         for step in _STEP * np.eye(STATES + INPUTS):
             above, _ = self.decide(step, (phi, 0.0, 0.0), thrust_n, None)
@@ -223,7 +222,7 @@ class PlanFlyer:
 
 
 def _mirrored(rows: Array) -> Array:
-    """Drop entries of rows, (3, 12), that are not their own mirror image."""
+    """Drop entries of (3, 12) that are not their own mirror image."""
     signs = np.array(MIRRORS)
     own = (signs[:, _MOMENTS, None] * signs[:, None, :] == 1).all(axis=0)
     kept: Array = np.where(own, rows, 0.0)

@@ -1,4 +1,4 @@
-"""`colibri certify`: certify a profile's law, fly it, print a table and draw a figure."""
+"""`colibri certify`: certify a law, fly it, and report."""
 
 from argparse import Namespace
 from math import degrees, log

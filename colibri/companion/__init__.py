@@ -1,4 +1,4 @@
-"""The control law as an offboard companion of a vehicle that flies PX4, ArduPilot or Colibri."""
+"""A control law as the offboard companion of a vehicle."""
 
 from typing import TYPE_CHECKING
 

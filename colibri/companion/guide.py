@@ -14,8 +14,7 @@ from colibri.companion.settings import CompanionSettings
 from colibri.companion.stack import Response, Thrust
 from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
-from colibri.companion.steering.references import PastReference, ReferenceHistory, smoothly_started
-from colibri.companion.steps import StepFlight
+from colibri.companion.steering.references import PastReference, ReferenceHistory, StepFlight, smoothly_started
 from colibri.companion.supervision.monitors import Consistency, SetpointRate
 from colibri.companion.supervision.phases import (
     CompanionEnd,
@@ -47,7 +46,7 @@ _GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0
 _STEADY_US = 1_000_000
 """Hold after the take-over, and streaming before it."""
 _BRAKES_US = 3_000_000
-"""Longest braking at the end of a track before the hand-over."""
+"""Longest braking before the hand-over."""
 _SLOW_M_S = 0.3
 _UP_M, _UP_M_S = 0.5, 0.3
 _CORRECTED_IN = 0.5
@@ -55,7 +54,7 @@ _CORRECTED_IN = 0.5
 
 
 class Companion:
-    """Flies one vehicle along one track. The readers of `said` and `rows` clear them."""
+    """Flies one vehicle; the readers of `said` and `rows` clear them."""
 
     def __init__(
         self,
@@ -122,11 +121,11 @@ class Companion:
 
     @property
     def completed(self) -> bool:
-        """Whether the track, or all steps of an identification, were flown."""
+        """Whether the track or all steps were flown."""
         return self._brakes
 
     def last_order(self) -> list[bytes]:
-        """Return the order to hold, for a process that ends by an error."""
+        """Return the order to hold, after an error."""
         stack = self.peer.stack
         if stack is None or not self._has_flown:
             return []
@@ -134,7 +133,7 @@ class Companion:
         return [self.peer.client.encode("COMMAND_LONG", *fields)]
 
     def stop(self, why: str, *, fault: bool = False) -> None:
-        """End the flight: hand over, or never begin. After a `fault` it has not ended in order."""
+        """Hand over, or never begin; after a `fault` the flight has not ended in order."""
         if not self._stopped:
             self.said.append(why)
         self._fault = self._fault or (why if fault else "")
@@ -216,7 +215,7 @@ class Companion:
         self._consistency.jumped_m = 0.0
 
     def _rehearse(self, now_us: int) -> None:
-        """Add the failures of a law that runs but does not fly; its time counts from when all checks passed."""
+        """Add the failures of a law that runs without flying."""
         if self._law_error:
             self.failing.append(f"control law: {self._law_error}")
         elif not self.failing and self._pace.kept(now_us, self.interval_us) < self._settings.limits.min_pace:

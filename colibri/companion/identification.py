@@ -1,7 +1,4 @@
-"""Identification of the body-rate response: a lag fitted by its output error, its figure, and its file.
-
-The simulated rates follow the commands alone, so feedback of the law does not bias the fit.
-"""
+"""Identification of the body-rate response: a lag fitted to the simulated rates, which follow the commands alone."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -34,7 +31,7 @@ MIN_EXPLAINED = 0.5
 
 
 class RateLog(NamedTuple):
-    """Commands by arrival at the vehicle, and measurements, on one clock; body rates in rad/s, (k, 3)."""
+    """Commands by arrival at the vehicle, and measurements; body rates, rad/s, (k, 3)."""
 
     command_s: Array
     commands: Array
@@ -43,7 +40,7 @@ class RateLog(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """A fitted lag for p, q, r, with the explained parts of variances, and body rates, rad/s, (k, 3)."""
+    """A fitted lag of p, q, r, with explained parts of variances, and body rates, rad/s, (k, 3)."""
 
     time_constant_s: Array
     acceleration_lag_s: Array
@@ -200,10 +197,7 @@ def identified(companion: Companion) -> Identified:
 
 
 def _of_second_order(response: Response, found: Fit) -> Response:
-    """Add the lags of the accelerations, and raise their limits to the rate loop's largest demand.
-
-    A law built for less would brake late after a disturbance, and swing.
-    """
+    """Add the lags, and raise the limits to the rate loop's largest demand: a law built for less would brake late."""
     p, q, r = found.acceleration_lag_s.tolist()
     most_p, most_q, most_r = (
         max(assumed, rate / lag_s) if behind_s > 0.0 else assumed

@@ -1,4 +1,4 @@
-"""Commands of each phase, and the modes that result from them."""
+"""Commands of each phase."""
 
 from math import nan
 
@@ -11,16 +11,16 @@ from colibri.mavlink.client.modes import FlightMode
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_TEMPORARILY_REJECTED, mav
 
 _STREAMS_FIRST_US = 1_000_000
-"""PX4 requires a stream of setpoints before it accepts offboard mode."""
+"""PX4 requires setpoints before offboard mode."""
 _HOLD_TRIES = 3
 _AGAIN_US = 400_000
 _ABOVE_SEA = -1.0
-"""Pitch, as QGroundControl sends it with a height above sea level; PX4 ignores it."""
+"""Pitch, as sent by QGroundControl; PX4 ignores it."""
 _LEAST_HEIGHT_M = 1.0
 
 
 class Orders:
-    """Sends the commands, and records a refusal by the vehicle in words."""
+    """Sends the commands, and records refusals."""
 
     def __init__(self, peer: VehiclePeer, settings: CompanionSettings, track_height_m: float) -> None:
         self._peer, self._settings = peer, settings
@@ -40,7 +40,7 @@ class Orders:
 
     @property
     def climbed(self) -> bool:
-        """Whether a stack with a take-off mode has left it for hold."""
+        """Whether the take-off mode, if the stack has one, is over."""
         stack = self._peer.stack
         return stack is not None and (
             stack.take_off is TakeOffOrder.ARM_THEN_COMMAND or self._peer.report.mode == stack.hold.custom
@@ -74,7 +74,7 @@ class Orders:
                 self._peer.ask("disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def own_modes(self, phase: CompanionPhase) -> frozenset[int]:
-        """Return the modes that the companion caused; until one is reported, with the previous mode."""
+        """Return the modes that the companion caused, with the previous one until one is reported."""
         mode = self._peer.report.mode
         if mode in self._own:
             self._reached = True
@@ -83,7 +83,7 @@ class Orders:
         return self._own | {self._before}
 
     def poll(self, phase: CompanionPhase, in_phase_us: int, *, ready: bool) -> None:
-        """Send the commands of a phase; `ready` permits the order to hold."""
+        """Send the commands of a phase; hold only if `ready`."""
         stack, results = self._peer.stack, self._peer.results
         self._in_phase_us = in_phase_us
         if stack is None or self._settings.dry_run:

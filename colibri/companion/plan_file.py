@@ -30,7 +30,7 @@ _ENDS = {mav.MAV_CMD_NAV_LAND: "landing", mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "ret
 
 
 class PlannedPoint(NamedTuple):
-    """A waypoint; `item` counts from 1, a heading of `None` looks along the path."""
+    """A waypoint; `item` counts from 1, without a heading it looks along the path."""
 
     item: int
     latitude_deg: float
@@ -45,7 +45,7 @@ class PlannedPoint(NamedTuple):
 
 
 class MissionPlan(NamedTuple):
-    """A mission of two points or more; `note` names items left to the pilot."""
+    """A mission; `note` names items left to the pilot."""
 
     path: Path
     points: tuple[PlannedPoint, ...]
@@ -70,7 +70,7 @@ class MissionPlan(NamedTuple):
 
 
 def read_plan(path: Path) -> MissionPlan:
-    """Read a mission, or raise `CompanionError` for an item that a track cannot fly."""
+    """Read a mission; `CompanionError` if a track cannot fly it."""
     try:
         plan = json.loads(read_text(path, "utf-8-sig"))
         mission = plan["mission"]

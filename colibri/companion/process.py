@@ -1,4 +1,4 @@
-"""Process of a companion: its link and its clock. All decisions are in `guide`."""
+"""Process of a companion: its link and clock, and its report."""
 
 import csv
 import signal
@@ -44,7 +44,7 @@ _SAY_FAILING_EVERY_S = 5.0
 _MAX_IGNORED = 5
 """Of more strangers nothing is said."""
 _SILENT_S = 3.0
-"""Silence of the vehicle after which another address may be its."""
+"""Silence after which the vehicle may have another address."""
 
 
 class CompanionFlight(NamedTuple):
@@ -165,7 +165,7 @@ def fly(args: Namespace) -> int:
 
 
 class _Wire:
-    """The link to one vehicle. Once that is known, other senders are ignored until it has been silent."""
+    """The link to one vehicle; other senders are ignored until it is silent."""
 
     def __init__(self, link: GroundLink) -> None:
         self.link = link
@@ -275,7 +275,7 @@ class _Log:
 
 
 def _signing(path: Path | None) -> tuple[Signing | None, str]:
-    """Return the signing of a key file, and a warning if others can read the key."""
+    """Return the signing by a key file, and a warning if others can read it."""
     if path is None:
         return None, ""
     try:

@@ -1,4 +1,4 @@
-"""File of an identified response, `companion.toml`: written by --identify, read by --response."""
+"""`companion.toml`, an identified response."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias

@@ -1,4 +1,4 @@
-"""A setpoint as MAVLink message and as row of the log, and totals of a flight's rows."""
+"""A setpoint as message and as row of the log, and totals of rows."""
 
 from collections import Counter
 from math import acos, cos, dist, nan, sqrt
@@ -16,10 +16,9 @@ from colibri.mavlink.client.setpoints import attitude_target, position_target
 
 
 class LogRow(NamedTuple):
-    """A setpoint and its inputs, for the time of effect; times in s on the companion's clock, m, rad, ENU and FLU.
+    """A setpoint and its inputs at the time of effect, s on the companion's clock, m, rad, ENU and FLU.
 
-    `thrust`, 0..1, stands for `thrust_n`; `push_*` is the observed disturbance, m/s²; `fallback` is as in flight.csv,
-    -1 after a solved QP.
+    `thrust`, 0..1, stands for `thrust_n`; `push_*` is the disturbance, m/s²; `fallback` is as in flight.csv.
     """
 
     t: float
@@ -88,7 +87,7 @@ class TrackErrors:
 
 
 class FlightSummary:
-    """Totals over the rows: sent setpoints, rows by fallback, seconds by phase."""
+    """Totals: sent setpoints, rows by fallback, seconds by phase."""
 
     def __init__(self) -> None:
         self.sent = 0
@@ -129,7 +128,7 @@ def message_of(
     thrust: float,
     y: Array,
 ) -> Encoded:
-    """Return name and fields of a setpoint's message; `decided` is the last decision on references."""
+    """Return name and fields of a setpoint; `decided` is the last decision on references."""
     if kind is SetpointKind.RATES or decided is None or decided.reference is None or decided.decision is None:
         return attitude_target(target, rates=asked.rate_flu_rad_s, thrust=thrust, time_us=now_us)
     if kind is SetpointKind.ATTITUDE:
@@ -155,7 +154,7 @@ def row_of(
     *,
     sent: bool,
 ) -> LogRow:
-    """Return the row of a setpoint; `head` is time, phase, age of the state and round trip, s."""
+    """Return a row; `head` is time, phase, age of the state and round trip, s."""
     time_s, phase, state_age_s, round_trip_s = head
     assert decided.reference is not None, "a law has decided"
     reference, place = decided.reference, first(y[None, model.POSITION])

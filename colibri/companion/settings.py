@@ -1,4 +1,4 @@
-"""Settings of a companion, from the command line of `colibri companion`."""
+"""Settings of a companion."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -19,14 +19,14 @@ class SetpointKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CompanionSettings:
-    """Settings of a flight; `None` as stack or response recognises it.
+    """Settings of a flight; `None` recognises stack or response.
 
     Attributes:
-        takeoff_height_m: Above the ground; `None` for the height of the track's first point.
+        takeoff_height_m: Above the ground; `None` for the track's first point.
         gives_up_s: Timeout of connection and checks.
-        system: MAVLink system id of the vehicle; 0 for the only one on the link.
+        system: MAVLink system id; 0 for the only one on the link.
         home: Where a mission was placed.
-        stay: The track is a hover; it begins where the vehicle is.
+        stay: The track is a hover where the vehicle is.
     """
 
     may_arm: bool = False

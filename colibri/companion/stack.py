@@ -1,8 +1,7 @@
-"""Flight stacks as values: what a companion depends on, and thrust in SET_ATTITUDE_TARGET.
+"""Flight stacks as values, and thrust in SET_ATTITUDE_TARGET.
 
-Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference (Multicopter Position Control, Motor Control, Geofence).
-ArduPilot, Copter Commands in Guided Mode (SET_ATTITUDE_TARGET, GUID_OPTIONS); Copter parameters;
-AP_Motors_Thrust_Linearization.cpp.
+Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference. ArduPilot, Copter Commands in Guided Mode; Copter
+parameters; AP_Motors_Thrust_Linearization.cpp.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,11 +19,10 @@ from colibri.plant.vehicle.description import Vehicle
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThrustCurve:
-    """Thrust convention of PX4 and ArduPilot.
+    """Thrust convention of PX4 and ArduPilot, whose `hover` carries the weight.
 
     A command u becomes x with u = (1 - expo) x + expo x², and x a motor signal between `spin_min` and `spin_max`.
-    Thrust is proportional to the square of a signal that is a rotor speed, else to the signal. `hover` carries the
-    weight.
+    Thrust is proportional to the signal, or to its square if the signal is a rotor speed.
     """
 
     hover: float
@@ -53,7 +51,7 @@ class ThrustCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MiddleHovers:
-    """Colibri's offboard mode: 0.5 carries the weight, 1 is the largest thrust, `max_load` weights."""
+    """Colibri's offboard mode: 0.5 carries the weight, 1 `max_load` weights."""
 
     max_load: float
     hover: float = 0.5
@@ -76,7 +74,7 @@ Parameters: TypeAlias = Mapping[str, float]
 """Parameters of the vehicle, by name."""
 
 MAX_STALE_S = 0.3
-"""So long a stack may follow the last body rates of a silent companion."""
+"""Longest use of the last body rates after a companion falls silent."""
 ROUNDING = 1e-6
 """Of single precision on the wire."""
 
@@ -95,15 +93,15 @@ class ParameterRule(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Response of body rates to commands, a lag of first or second order, and of thrust, of first order.
+    """Response of body rates, a lag of first or second order, and of thrust, of first order.
+
+    Assumed time constants are short: too long a one costs stability, too short a one only bandwidth.
 
     Attributes:
         time_constant_s: The rate loop demands the acceleration (command - rate) / time constant.
         latency_s: From a command's arrival to its first effect.
         max_rate_rad_s, max_acceleration_rad_s2: Limits in the stack.
-        acceleration_lag_s: As from motors; 0 for first order.
-
-    Too short a time constant costs bandwidth, too long a one stability: the assumed ones are short.
+        acceleration_lag_s: 0 for first order.
     """
 
     time_constant_s: Vector
@@ -119,11 +117,10 @@ class Stack:
     """A flight stack.
 
     Attributes:
-        steady: `custom_mode` of modes that permit a take-over: the vehicle keeps its place.
+        steady: `custom_mode` of modes that permit a take-over.
         streams: Rates of requested messages, Hz.
-        needed: Parameters without which nothing is flown; `optional` ones may not exist.
+        needed: Parameters required to fly; `optional` ones may not exist.
         fence: Parameters of the fence's radius and height, m; 0 disables it.
-        response: Assumed without identification.
         integers_by_bits: Integer parameters travel bytewise.
     """
 
@@ -157,7 +154,7 @@ _PX4_STATUS_HZ = {"CURRENT_MODE": 25.0, "ESTIMATOR_STATUS": 5.0, **_STATUS_HZ}
 
 
 def _curve(numbers: Mapping[str, tuple[str, float]]) -> Callable[[Parameters, Vehicle], ThrustCurve]:
-    """Return a thrust curve by the stack's parameters, each with its default."""
+    """Return a thrust curve by parameters, each with its default."""
 
     def thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
         found = {number: parameters.get(name, default) for number, (name, default) in numbers.items()}
@@ -221,7 +218,7 @@ ARDUPILOT = Stack(
 
 
 _IDENTIFIED = Response((0.032, 0.032, 0.128), 0.010, 0.0, (4.0, 4.0, 2.0), (120.0, 120.0, 15.0), (0.014, 0.014, 0.010))
-"""Result of --identify with profile `flight`, the same for any airframe."""
+"""Result of --identify, the same for any airframe."""
 
 
 def _colibri_thrust(parameters: Parameters, vehicle: Vehicle) -> MiddleHovers:
@@ -245,7 +242,7 @@ _BY_AUTOPILOT = {PX4.autopilot: PX4, ARDUPILOT.autopilot: ARDUPILOT}
 
 
 def recognised(autopilot: int, uid2: bytes) -> Stack | None:
-    """Return the stack of a HEARTBEAT's `autopilot` and an AUTOPILOT_VERSION's `uid2`, if it is known."""
+    """Return the stack of a HEARTBEAT's `autopilot` and an AUTOPILOT_VERSION's `uid2`, if known."""
     if autopilot in (PX4.autopilot, AUTOPILOT_GENERIC) and uid2.startswith(PRODUCT):
         return COLIBRI
     return _BY_AUTOPILOT.get(autopilot)

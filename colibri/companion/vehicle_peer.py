@@ -1,4 +1,4 @@
-"""The vehicle at the other end of a link: bytes and time in, bytes and timed states out; its home."""
+"""The vehicle at the other end of a link: bytes and time in, bytes and timed states out."""
 
 from collections import deque
 from math import hypot
@@ -35,7 +35,7 @@ class ReceivedState(NamedTuple):
 
 
 class VehiclePeer:
-    """One vehicle; `system` is 0 and `stack` is `None` until they are known."""
+    """One vehicle; `system` is 0 and `stack` `None` until known."""
 
     def __init__(self, stack: Stack | None = None, system: int = 0) -> None:
         own = mav.MAV_TYPE_ONBOARD_CONTROLLER
@@ -73,7 +73,7 @@ class VehiclePeer:
         return {name: order.result for name, order in self._orders.items() if order.result is not None}
 
     def ask(self, name: str, number: int, *params: float) -> None:
-        """Send a command until it is acknowledged, unless one of this name is pending."""
+        """Send a command until it is acknowledged, unless it is pending."""
         under_way = self._orders.get(name)
         if under_way is None or under_way.result is not None:
             self._orders[name] = self.client.begin(Command(self.target, number, *params, repeat=_COMMANDS))
@@ -170,7 +170,7 @@ class VehiclePeer:
         ]
 
     def _renew_streams(self, now_us: int) -> None:
-        """Request the streams, repeatedly while states arrive at less than half of their rate or a report is old."""
+        """Request the streams while states arrive too slowly or a report is old."""
         under_way = any(stream.result is None for stream in self._streams)
         if self.stack is None or now_us < self._renew_at_us or under_way:
             return
@@ -188,7 +188,7 @@ _AGAIN_US = 500_000
 
 
 class LocalOrigin(NamedTuple):
-    """Origin of the vehicle's local frame, and height of home in it."""
+    """Origin of the local frame, and height of home in it."""
 
     origin: Geodetic
     up_m: float
@@ -222,7 +222,7 @@ class HomeSeeker:
 
 
 def moved_m(planned: LocalOrigin | None, report: VehicleReport) -> float:
-    """Return by how much the vehicle's home, or its local frame, has moved since a mission was placed, m."""
+    """Return by how much home or the local frame has moved, m."""
     now = local_origin(report)
     if planned is None or now is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""Conformance tests of a control law: its interface, its memory, its limits, its flights."""
+"""Conformance tests of a control law."""
 
 from typing import TYPE_CHECKING
 

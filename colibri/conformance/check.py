@@ -9,11 +9,11 @@ from typing import Any
 from colibri.analysis.tables import markdown, print_table
 from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, one_line
-from colibri.conformance.flight_checks import flight_checks, time_checks
 from colibri.conformance.interface_checks import interface_checks, limit_checks
 from colibri.conformance.loop_flight import restart_checks
 from colibri.conformance.memory_checks import memory_checks
 from colibri.conformance.optional_checks import optional_checks
+from colibri.conformance.step_records import flight_checks, time_checks
 from colibri.conformance.subject import Check, Result, Row, Subject
 from colibri.experiments.notebook import table_html
 
@@ -37,7 +37,7 @@ class AreaError(Error):
 
 @dataclass(frozen=True, slots=True)
 class Conformance:
-    """Results of the checks of a control law, with its profile, vehicle and seed."""
+    """Results of the checks of a control law."""
 
     name: str
     flown_by: str

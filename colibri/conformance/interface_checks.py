@@ -1,4 +1,4 @@
-"""Checks of a law's members, and of decisions within limits after extreme states and references that jump."""
+"""Checks of a law's members, and of its decisions after extreme states and references that jump."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeAlias
@@ -14,7 +14,7 @@ from colibri.conformance.subject import Result, Row, Subject, judged, not_applic
 
 
 class Protocol(NamedTuple):
-    """An optional part of the interface, used only if all its members exist."""
+    """A part of the interface, used if all its members exist."""
 
     what: str
     members: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A control loop over the plant, with restarts and attitude demands in flight, and the checks of restarts."""
+"""A control loop over the plant, with restarts and attitude demands, and their checks."""
 
 from collections.abc import Iterator
 from math import acos, degrees
@@ -37,7 +37,7 @@ class LoopFlight:
         return ControlLoop(self._subject.profile, self._subject.vehicle, perf_counter, self._subject.law)
 
     def fly(self, seconds: float) -> Array:
-        """Follow the track; return the distance to the reference at each control sample, m."""
+        """Follow the track; return the distance to it at each sample, m."""
         off_m = []
         for _ in range(self._samples(seconds)):
             state = self.loop.observe(state_frame(self.world))
@@ -72,7 +72,7 @@ class Restarted(NamedTuple):
     """A flight with a restart in its middle.
 
     Attributes:
-        unbroken_m, off_m: Distance to the reference afterwards, m, (n,), without and with it.
+        unbroken_m, off_m: Distance to the reference afterwards, (n,), without and with it.
         same: Both flights are identical, bit for bit.
         is_plain: The law's memory was kept.
     """
@@ -85,7 +85,7 @@ class Restarted(NamedTuple):
 
 
 _BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5
-"""Durations before and after a restart, and of a held attitude."""
+"""Durations around a restart, and of a held attitude."""
 HOW = ("seamless", "anew", "blind")
 
 
@@ -99,11 +99,7 @@ def restarted(
     seed: int = 0,
     **options: Any,
 ) -> Restarted:
-    """Fly, replace the control loop in flight, and fly on.
-
-    `how` is `seamless`: from a recent checkpoint; `anew`: from an old one, with only charge and mass; or `blind`:
-    without.
-    """
+    """Fly on with a new control loop: `seamless` from a recent checkpoint, `anew` from charge and mass, or `blind`."""
     subject = Subject.of(controller, profile, vehicle, seed)
     return restart(subject, how, subject.plan(track, **options))
 
@@ -131,7 +127,7 @@ def held(
     profile: Any = None,
     vehicle: Any = None,
 ) -> VehicleState:
-    """Have a law hold roll and pitch, rad, and a thrust, N, for 1.5 s from hover; return the final state."""
+    """Hold roll and pitch, rad, and a thrust, N, for 1.5 s from hover; return the final state."""
     return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n)
 
 
@@ -146,7 +142,7 @@ _BY, _NUMBERS = 1.05, 16
 
 
 class Rebuilt(NamedTuple):
-    """A law with one changed number; `None` if it refused, changed its interval, or raised."""
+    """A law with one changed number, unless it refused, changed its interval, or raised."""
 
     key: str
     value: float
@@ -155,12 +151,12 @@ class Rebuilt(NamedTuple):
 
 
 def rebuilt(key: str, value: float, *, controller: Any, profile: Any = None, vehicle: Any = None) -> Controller[Any]:
-    """Build a control law with one number changed, in its table or `body.mass_kg`."""
+    """Build a law with one other number, in its table or `body.mass_kg`."""
     return _build(Subject.of(controller, profile, vehicle, 0), key, value)
 
 
 def rebuilds(subject: Subject) -> Iterator[Rebuilt]:
-    """Yield laws with another mass, and with up to 16 numbers of the table, each 5 % higher."""
+    """Yield laws with another mass, and with up to 16 numbers, each 5 % higher."""
     table = subject.profile.table(subject.name)
     found = [path for path in paths(table) if isinstance(read(table, path), float)]
     every = -(-len(found) // _NUMBERS) or 1

@@ -18,7 +18,7 @@ _S, _SAMPLES = 0.6, 8
 """Duration, and least number of samples."""
 
 Taken: TypeAlias = Iterator[tuple[int, Array, Array]]
-"""Number of a step in its flight, its original rotor speeds, and the repeated ones."""
+"""Number of a step, and its original and repeated rotor speeds."""
 
 
 class RepeatedSteps(NamedTuple):

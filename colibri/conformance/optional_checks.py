@@ -1,4 +1,4 @@
-"""Checks of the optional protocols: consistent values, and flight with them."""
+"""Checks of the optional protocols."""
 
 from collections.abc import Callable, Iterator
 from math import acos, cos, degrees, isfinite, radians, sin

@@ -1,6 +1,6 @@
-"""Steps of a flight with their memory, state and references, for repetition."""
+"""Steps of a flight for repetition, and checks in flight: hover, tracks, wind, time."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pickle import dumps
@@ -9,11 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colibri.analysis.outcome import fly_to_its_end
+from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.interface import Clock, Controller, Decision, Horizon, VehicleState
 from colibri.autopilot.control.registry import DecisionError, check_answer, in_words
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.common.errors import Error, InFlightError
 from colibri.common.types import Array
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.in_process import put_together
 from colibri.plant.vehicle.description import Vehicle
@@ -34,7 +37,7 @@ class FlownStep(NamedTuple):
     Attributes:
         memory: The object itself; `pickled` before the step, if possible.
         references: A copy; `changed` if the law has modified its own.
-        decision: The object itself, with a copy of its `rotor_speeds`.
+        decision: The object itself; `rotor_speeds` is a copy.
     """
 
     method: str
@@ -66,7 +69,7 @@ class FlownSteps(NamedTuple):
 
 
 class RecordingLaw:
-    """A control law that records each step; it has the same members as the original."""
+    """A law that records each step, with the original's members."""
 
     def __init__(self, law: Controller[Any]) -> None:
         self.steps: list[FlownStep] = []
@@ -121,7 +124,7 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> FlownSteps:
 def flown_steps(
     track: str, *, controller: Any, profile: Any = None, vehicle: Any = None, seed: int = 0, **options: Any
 ) -> tuple[Controller[Any], list[FlownStep]]:
-    """Fly a control law with options of `colibri.fly`; return the law, rebuilt, and its steps."""
+    """Fly with options of `colibri.fly`; return the law, rebuilt, and its steps."""
     subject = Subject.of(controller, profile, vehicle, seed)
     flown = fly_for_steps(subject, track, **options)
     if flown.raised is not None:
@@ -157,3 +160,86 @@ def jumped(step: FlownStep, seed: int) -> FlownStep:
     references.acceleration_enu_m_s2[since:] += rng.normal(scale=_JUMP_M, size=3)
     references.yaw_rad[since:] += rng.normal(scale=_JUMP_RAD)
     return step._replace(references=references, state=step.state._replace(airborne=not step.state.airborne))
+
+
+_HOVER_S, _MAX_DRIFT_M = 8.0, 0.5
+"""Permitted drift in calm air, from rest on the point."""
+_WIND, _WIND_S = "5@270", 12.0
+_TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5
+"""Duration and least number of timed steps, without the first few."""
+
+
+class FlownDistance(NamedTuple):
+    """Distance to the reference at each sample, (n,), and reason of a loss."""
+
+    lost: str
+    off_m: Any
+
+    @property
+    def rms_m(self) -> float:
+        """RMS over the last third."""
+        late = self.off_m[2 * len(self.off_m) // 3 :]
+        return float(np.sqrt(np.mean(late**2))) if len(late) else np.nan
+
+
+def flight_checks(subject: Subject) -> Iterator[Row]:
+    yield _hover(subject)
+    for track in THESIS_TRACKS:
+        yield _flown(subject, track, f"{track}, {subject.duration_s:g} s", duration=subject.duration_s)
+    if subject.vehicle.drag is None:
+        yield not_applicable("hover in wind of 5 m/s", f"{subject.vehicle.name} has no drag")
+    else:
+        yield _flown(
+            subject,
+            "hover",
+            "hover in wind of 5 m/s, turbulence",
+            wind=_WIND,
+            turbulence="light",
+            start=subject.start(),
+            duration=_WIND_S,
+        )
+
+
+def time_checks(subject: Subject) -> Iterator[Row]:
+    """Yield times of steps: figures, as they vary between runs."""
+    interval_us = subject.build().control_interval_us
+    seconds = max(_TIMED_S, _TIMED * interval_us * 1e-6)
+    steps = fly_for_steps(subject, "lemniscate:lap=20", duration=seconds).steps[_UNTIMED:]
+    if not steps:
+        yield not_applicable("a step", "it took too few")
+        return
+    p50_us, p99_us = np.percentile([1e6 * step.took_s for step in steps], (50, 99))
+    part = p99_us / interval_us
+    found = f"p50 {p50_us:.0f} µs, p99 {p99_us:.0f} µs: {part:.2g} of its {interval_us / 1000:g} ms"
+    yield Row("", f"{len(steps)} steps", Result.FIGURE, found)
+
+
+def _hover(subject: Subject) -> Row:
+    options = {"start": subject.start(), "duration": _HOVER_S}
+    flown = fly(subject, "hover", **options)
+    furthest_m = float(flown.off_m.max()) if len(flown.off_m) else np.nan
+    drifts = f"{furthest_m:.2f} m off its point: expected at most {_MAX_DRIFT_M:g} m"
+    failure = flown.lost or (drifts if not furthest_m <= _MAX_DRIFT_M else "")
+    found = f"at most {_length(furthest_m)} off"
+    return judged(f"hover held, {_HOVER_S:g} s", failure, found, subject.command("hover", **options))
+
+
+def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
+    flown = fly(subject, track, **options)
+    found = f"RMS {_length(flown.rms_m)} after {options['duration'] * 2.0 / 3.0:.3g} s"
+    return judged(tried, flown.lost, found, subject.command(track, **options))
+
+
+def fly(subject: Subject, track: str, **options: Any) -> FlownDistance:
+    try:
+        plan = subject.plan(track, **options)
+        outcome = fly_to_its_end(plan)
+    except Exception as error:
+        return FlownDistance(in_words(error), np.empty(0))
+    if outcome.report is None:
+        return FlownDistance(outcome.lost, np.empty(0))
+    return FlownDistance(outcome.lost, read_recording(plan, outcome.log).position_error_m)
+
+
+def _length(metres: float) -> str:
+    return f"{1000.0 * metres:.3g} mm" if metres < 1.0 else f"{metres:.3g} m"

@@ -1,4 +1,4 @@
-"""The control law under test, commands that repeat its flights, and rows of the table."""
+"""The law under test, commands that repeat its flights, and rows."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Subject:
         return self.profile.controller
 
     def start(self, **changed: float) -> dict[str, float]:
-        """Return a start at rest in hover 2 m above the origin, with changes."""
+        """Return a start in hover 2 m above the origin, with changes."""
         rpm = self.vehicle.hover_speed / self.vehicle.speed_from_rpm(1.0)
         return {"x": 0.0, "y": 0.0, "z": 2.0, "rotors": round(rpm, 3), **changed}
 
@@ -62,19 +62,19 @@ class Subject:
         return FlightPlan.of(FlightSpec.of(track, **every))
 
     def command(self, track: str, **options: Any) -> str:
-        """Return a command that repeats the flight, or Python for an unregistered law."""
+        """Return a command, or Python, that repeats the flight."""
         every = {**self.given, "link": "direct", "seed": self.seed, **options}
         if all(isinstance(value, str) for value in self.given.values()):
             return f"colibri fly {join([track, *(_option(*each) for each in every.items())])}"
         return f"colibri.fly({track!r}, {_words(every)})"
 
     def snippet(self, code: str, track: str, **options: Any) -> str:
-        """Return Python that flies, and runs `code` with law `law` and steps `s`."""
+        """Return Python that runs `code` with law `law` and steps `s` of a flight."""
         names = ["flown_steps", *(name for name in ("jumped", "rebuilt") if f"{name}(" in code)]
         return self.script(f"law, s = flown_steps({self.call(track, **options)}); {code}", *names)
 
     def script(self, code: str, *names: str) -> str:
-        """Return Python with imports of this package, as a shell command if possible."""
+        """Return Python with imports, as a shell command if possible."""
         code = f"from {_MODULE} import {', '.join(names)}; {code}"
         by_name = all(isinstance(value, str) for value in self.given.values())
         if not by_name:
@@ -128,7 +128,7 @@ class Result(StrEnum):
 
 
 class Row(NamedTuple):
-    """One trial; `see` is a command, or Python, that shows its failure. `check_controller` adds the area."""
+    """A trial, whose area `check_controller` adds; `see` shows its failure."""
 
     area: str
     tried: str

@@ -1,6 +1,3 @@
-"""Many flights side by side.
-
-Comparisons, seeds, the thesis's figures, the studies of profile flight, verification.
-"""
+"""Comparisons, seeds, the thesis's figures, studies."""
 
 __all__: list[str] = []  # the command line's; nothing to import

@@ -1,4 +1,4 @@
-"""Campaign of `colibri compare`: contenders, profiles with controllers; contents identify completed flights."""
+"""`colibri compare`: contenders, which are profiles with controllers, and tracks in one table."""
 
 import argparse
 from collections import Counter
@@ -44,10 +44,7 @@ def folder_name(track: str) -> str:
 
 
 def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = None) -> dict[str, dict[str, str]]:
-    """Return the levels of a campaign's factor from `NAME[:CONTROLLER]`.
-
-    A level has the profile's name, or its path where names coincide.
-    """
+    """Return the contenders `NAME[:CONTROLLER]` by name, or by path where names coincide."""
     given: dict[tuple[str, str | None], None] = {}
     for text in profiles:
         head, toml, tail = text.partition(".toml")
@@ -65,7 +62,7 @@ def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = N
 
 
 def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:
-    """Fly all contenders, tracks and seeds; `NAME-journal.jsonl` records each flight as it ends."""
+    """Fly everything; `NAME-journal.jsonl` records each flight."""
     planned = _campaign(args, name, metrics, logs)
     if planned.flights > MAX_UNASKED:
         raise CampaignError(f"{planned.flights} flights exceed the limit of {MAX_UNASKED} are compared")
@@ -178,7 +175,7 @@ _FORMATS = (".4g", ".4g", ".4g", ".0f", ".0f")
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Compare; RMS is that after the first 20 s, the maximum includes the start."""
+    """Compare; RMS excludes the first 20 s, the maximum does not."""
     table = fly_comparison(args, "compare", with_limits(_METRICS, args.fail_above), "all")
     rows = [(*names, *_cells(table.flown[place])) for names, (place,) in table.groups().items()]
     write_table(args.out / "compare", COLUMNS, rows, names=2, notes=table.notes)

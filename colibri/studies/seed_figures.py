@@ -45,7 +45,7 @@ _BY_TRUTH = ("RMS (m)", {_TRUE: ("#000000", "off its reference")})
 
 
 def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
-    """Draw `seeds.png`: a dot a flight, a bar at the median; NEES and NIS with their bounds."""
+    """Draw `seeds.png`: a dot a flight, a bar at the median, and bounds."""
     cases = table.groups()
     estimated = not np.isnan(table.metric("estimation_rmse_m.horizontal")).all()
     panels = _PANELS if estimated else (_BY_TRUTH,)

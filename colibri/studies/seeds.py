@@ -23,7 +23,7 @@ HEADINGS = (
     "NEES",
 )
 _WITHOUT_ESTIMATE = 5
-"""Columns of a flight on the state, where control and true error are the same."""
+"""Columns of a flight on the state."""
 _ERRORS = (
     *("control_rmse_m", "rmse_after_20s_m", "estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw"),
@@ -35,9 +35,7 @@ METRICS = (
     *map(Metric, (*_ERRORS, NEES)),
     *(Metric(f"nis_mean.{kind}.{figure}") for kind in MEASURED for figure in ("mean", "innovations")),
 )
-"""After 20 s: RMS of one flight, m and degrees; mean NEES; by kind of measurement mean NIS over its degrees of freedom,
-and the number of innovations.
-"""
+"""RMS of one flight after 20 s, m and degrees; mean NEES; by kind mean NIS, relative, and innovations."""
 
 
 def compare_seeds(args: argparse.Namespace) -> int:
@@ -61,7 +59,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
 
 
 def _cells(table: FlightTable, places: Sequence[int]) -> Row:
-    """Return RMS over the flights, the mean of NEES, and in brackets the largest of one flight."""
+    """Return RMS over flights, mean NEES, and in brackets the largest."""
     through = table.through(places)
     errors = (_cell(table.metric(name)[through], rms) for name in _ERRORS)
     return (

@@ -1,4 +1,4 @@
-"""`colibri study`: performance of profile `flight`, each study with a table and figures."""
+"""`colibri study`: tables and figures of profile `flight`."""
 
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -50,7 +50,7 @@ class Measure(NamedTuple):
 
 
 class StudyCase(NamedTuple):
-    """A flight, the names of its row, and its group of columns."""
+    """A flight, its row, and its group of columns."""
 
     row: Row
     group: str
@@ -58,7 +58,7 @@ class StudyCase(NamedTuple):
 
 
 class Study(NamedTuple):
-    """Cases, the measures of each group, and a function from results to named figures."""
+    """Cases, measures of each group, and a function to named figures."""
 
     name: str
     headings: Row
@@ -80,7 +80,7 @@ def unless_crashed(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
 
 
 def bound(column: int) -> Callable[[Flown], str]:
-    """Return the percentage of settled control samples with a kind of constraint active."""
+    """Return how often, %, a kind of constraint is active once settled."""
 
     def cell(flown: Flown) -> str:
         binds = flown.recording.active[flown.settled[:-1], column] > 0
@@ -134,7 +134,7 @@ def _recovery() -> Iterable[StudyCase]:
 
 
 def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:
-    """Return a plant that differs by factors; without ground, as a lighter body needs a softer one."""
+    """Return a plant that differs by factors; a lighter body needs another ground, so it has none."""
     return {
         "plant-vehicle.body.mass_kg*": mass,
         "plant-vehicle.body.inertia_kg_m2*": inertia,
@@ -245,7 +245,7 @@ def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:
 
 
 def table(study: Study, flown: Sequence[Flown]) -> tuple[Row, list[Row]]:
-    """Return headings and rows: one row for each name, in it the measures of each group."""
+    """Return headings and rows, one for each name."""
     groups = list(dict.fromkeys(case.group for case in study.cases))
     headings = [f"{group}: {measure.heading}".removeprefix(": ") for group in groups for measure in study.measures]
     cells = {

@@ -21,13 +21,13 @@ from colibri.mavlink.ulog.log import MemoryLog
 
 _AWAY_M = 200.0
 _GROUNDED_M = 0.1
-"""Below all studies; a vehicle on its back lies at most as high as on its feet."""
+"""A vehicle on its back is lower than that."""
 _SAMPLE_TIME_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A completed flight; rotor limits are the least speed, and the largest by battery voltage, (n,)."""
+    """A flight; rotor limits are the least speed, and the largest by voltage, (n,)."""
 
     recording: Recording
     rotor_limits: tuple[float, Array]
@@ -39,7 +39,7 @@ class Flown:
 
     @property
     def upright(self) -> Array:
-        """Upright part of the body's z axis, the cosine of the tilt, (n,)."""
+        """Cosine of the tilt, (n,)."""
         cosine: Array = np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
         return cosine
 
@@ -56,7 +56,7 @@ class Flown:
 
     @property
     def rms_m(self) -> float:
-        """RMS of the settled position error; nan for a flight too short."""
+        """RMS of the settled error; nan in a short flight."""
         error = self.recording.position_error_m[self.settled]
         return float(np.sqrt(np.mean(error**2))) if len(error) else nan
 
@@ -71,7 +71,7 @@ class Flown:
 
     @property
     def crashed(self) -> bool:
-        """Whether it ended early, came down to the ground, or flew away."""
+        """Whether it ended early, came down, or flew away."""
         came_down = float(self.recording["z"].min()) < _GROUNDED_M
         return self.failure is not None or came_down or float(self.recording.position_error_m.max()) > _AWAY_M
 
@@ -84,7 +84,7 @@ class Flown:
         return decided
 
     def stays_below(self, values: Array, bound: float) -> float:
-        """Return the first time after which `values` (n,) stay below `bound`; nan if they do not."""
+        """Return when `values` (n,) stay below `bound` for good; nan if never."""
         above = np.flatnonzero(values >= bound)
         first = above[-1] + 1 if len(above) else 0
         return float(self.t[first]) if first < len(values) else nan

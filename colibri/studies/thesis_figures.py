@@ -1,4 +1,4 @@
-"""`colibri figures`: fly the thesis's flights, and draw its result figures under their numbers."""
+"""`colibri figures`: the thesis's result figures, flown anew."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -40,7 +40,7 @@ class ThesisFlight(NamedTuple):
 
 
 class ThesisFigure(NamedTuple):
-    """A figure of the thesis: its number, flight, and kind of plot."""
+    """A figure: its number, flight, and kind of plot."""
 
     number: str
     flight: str
@@ -114,7 +114,7 @@ def draw(job: FigureJob) -> list[Path]:
 
 
 class PlotKind(NamedTuple):
-    """A kind of plot: its subject in titles, and its function."""
+    """Subject of a plot in titles, and its function."""
 
     subject: str
     plot: Callable[[Series, str], Figure]

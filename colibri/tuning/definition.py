@@ -84,7 +84,7 @@ class Tuning(NamedTuple):
         return {name: as_flown(self.space[name], value) for name, value in params.items()}
 
     def steps(self) -> list[list[Point]]:
-        """Return the flights of a trial in steps, between which it may be pruned."""
+        """Return a trial's flights in steps, between which it may be pruned."""
         seeds = self.campaign.seeds
         by_seed: dict[int, list[Point]] = {seed: [] for seed in seeds}
         for point in self.campaign.points():
@@ -97,7 +97,7 @@ class Tuning(NamedTuple):
 
 
 def tuning_of(tables: TuningTables) -> Tuning:
-    """Read a tuning, and plan flights at the ends of all ranges to find errors early."""
+    """Read a tuning; flights at the ends of all ranges are planned to find errors early."""
     space = _space(tables)
     campaign = campaign_of(
         CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})

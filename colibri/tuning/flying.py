@@ -1,4 +1,4 @@
-"""Fly a trial until its end, or until it is clearly worse than the best."""
+"""Fly a trial, unless it is clearly worse than the best."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -19,17 +19,14 @@ _WORST, _EACH = "worst", "each"
 
 
 class Scale(NamedTuple):
-    """Reference values by objective, from the original profile: of a lost flight, and of each flight."""
+    """The original profile's values by objective: of a lost flight, and of each."""
 
     worst: tuple[float, ...]
     each: tuple[tuple[float, ...], ...]
 
 
 class TrialFlights:
-    """Flies with an engine whose workers are kept between trials.
-
-    It is also the engine's iterator of jobs.
-    """
+    """Flies with an engine that is kept between trials; iterates over its jobs."""
 
     def __init__(self, engine: Engine, common: Common) -> None:
         self._left: deque[Point] = deque()
@@ -63,12 +60,7 @@ def fly_trial(
     best: float,
     progress: Callable[[FlightResult], object],
 ) -> FinishedTrial:
-    """Fly a trial.
-
-    Args:
-        scale: Reference of the original profile; `None` in its own trial.
-        best: Least value so far; a pruned trial counts at least that.
-    """
+    """Fly a trial; `scale` is `None` in the original's, a pruned one counts at least the `best` value."""
     factors = tuning.flown(begun.params)
     flown: list[FlightResult] = []
     counts: list[Array] = []

@@ -18,8 +18,7 @@ from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.common.errors import checked
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.flying import TrialFlights, fly_trial, scale_kept
-from colibri.tuning.profile_file import tuned_name
-from colibri.tuning.results import TuningResults
+from colibri.tuning.results import TuningResults, tuned_name
 from colibri.tuning.space import TuningError
 from colibri.tuning.trials import FileLock, Trials, require_optuna
 from colibri.tuning.verdict import check_campaign

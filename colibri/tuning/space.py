@@ -96,7 +96,7 @@ def as_flown(values: Range, value: Any) -> Any:
 
 SHARE_LOST = "share_lost"
 LOST_COUNTS = 10.0
-"""A lost flight counts this many times the largest value with the original profile."""
+"""How many of the largest original value a lost flight counts."""
 _POOLINGS = ("mean", "rms", "median", "largest")
 _NOT_SMALL = ("lost_at_s",)
 
@@ -115,14 +115,14 @@ class Objective(NamedTuple):
         return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
 
     def of_flights(self, flown: Sequence[FlightResult], metrics: Sequence[Metric], worst: float) -> Array:
-        """Return each flight's value, (n,), at most `worst`, which replaces missing ones."""
+        """Return each flight's value, (n,), at most `worst`."""
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
         return np.array([min(value_of(each, place, worst), worst) for each in flown])
 
     def worst(self, flown: Sequence[FlightResult], metrics: Sequence[Metric]) -> float:
-        """Return the value of a lost flight, from the original profile's flights."""
+        """Return the value of a lost flight, by the original profile."""
         if self.metric == SHARE_LOST:
             return 1.0
         place = [metric.name for metric in metrics].index(self.metric)

@@ -52,7 +52,7 @@ class FileLock:
 
 
 class JournalLock(FileLock):
-    """A writer's lock on a journal; removes the incomplete last line of a dead one."""
+    """A writer's lock on a journal; drops a dead one's incomplete line."""
 
     def __init__(self, journal: Path) -> None:
         super().__init__(journal.with_name(f"{journal.name}.lock"))
@@ -80,12 +80,12 @@ JOURNAL, _LOCKS = "trials.log", "locks"
 _NUMBER, _PROCESS, _FLIGHTS, _LOST, _PRUNED = "number", "process", "flights", "lost", "pruned"
 _POLL_S = 0.2
 _MAX_P = 0.05
-"""A trial is pruned if it is worse than the best at this significance level."""
+"""A worse trial is pruned at this significance level."""
 _BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
 class FinishedTrial(NamedTuple):
-    """A finished trial; number 0 is the original profile. Objectives are extrapolated if pruned."""
+    """A trial; number 0 is the original profile. If pruned, values are extrapolated."""
 
     number: int
     values: tuple[float, ...]
@@ -103,10 +103,10 @@ class Begun(NamedTuple):
 
 
 class Trials:
-    """The trials of a tuning in a folder, shared by several processes.
+    """The trials of a tuning in a folder, shared by processes.
 
-    Each process holds a lock that ends with it, so that others repeat its unfinished trials. A trial depends only on
-    earlier trials, its number and the root seed: a resumed tuning continues as it would have.
+    Each holds a lock that ends with it, so that others repeat its unfinished trials. A trial depends on earlier trials,
+    its number and the root seed: a resumed tuning continues as it would have.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -136,10 +136,7 @@ class Trials:
         self._held.release()
 
     def ask(self) -> Begun | None:
-        """Begin the next trial; `None` when all have ended.
-
-        It waits for the first trial, the reference of all, and for those of other processes, which may die.
-        """
+        """Begin the next trial, if any, after waiting for the first and for other processes, which may die."""
         while True:
             with self._asking:
                 self._give_up_abandoned()
@@ -162,10 +159,10 @@ class Trials:
         return [_ended(trial) for trial in self._trials() if trial.state.is_finished()]
 
     def importances(self) -> list[dict[str, float]]:
-        """Return the importance of each number for being among the best quarter of trials, by objective.
+        """Return each number's importance for being among the best quarter of trials, by objective.
 
         S. Watanabe, A. Bansal, F. Hutter, PED-ANOVA: Efficiently Quantifying Hyperparameter Importance in Arbitrary
-        Subspaces, IJCAI 2023. A tenth, their default, would be too few trials.
+        Subspaces, IJCAI 2023. Their default, a tenth, would be too few trials.
         """
         from optuna.importance import PedAnovaImportanceEvaluator, get_param_importances
 

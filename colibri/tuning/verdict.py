@@ -106,7 +106,7 @@ class _Pairs:
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
     def _counts(self, objective: Objective, *, penalised: bool) -> Array:
-        """Return values, (2, combinations, seeds); without penalty, pairs with a lost flight are nan."""
+        """Return values, (2, combinations, seeds); unless penalised, pairs with a lost flight are nan."""
         metrics = self._campaign.metrics
         if penalised or objective.metric == SHARE_LOST:
             worst = objective.worst(self._listed(0), metrics)

@@ -20,9 +20,9 @@ _SCALE: tuple[tuple[float, Colour], ...] = (
     (1.0, (220, 40, 40)),
 )
 _MAX_ARROW = 3.0
-"""Length of a rotor's arrow at top speed, in radii of the rotor."""
+"""Length of an arrow at top speed, in radii of the rotor."""
 _TURNS_A_SECOND = 1.5
-"""Displayed rate of a rotor at top speed; the true one would alias."""
+"""Displayed rate at top speed; the true one would alias."""
 _EDGES = 4
 """Upright lines of a circular zone."""
 
@@ -49,7 +49,7 @@ def about_up(angle_rad: float) -> Quaternion:
 
 
 def thrust_arrows(airframe: VehicleShape, rotors: PerRotor, scale: float) -> Array:
-    """Return the ends of thrust arrows, proportional to squared speeds; FLU, m times scale, (N, 2, 3)."""
+    """Return thrust arrows, FLU, m times scale, (N, 2, 3)."""
     arrows = np.zeros((len(airframe.rotors_m), 2, 3))
     arrows[:, :, :2] = scale * np.array(airframe.rotors_m)[:, None, :]
     lengths = np.nan_to_num(np.square(rotors)) * _MAX_ARROW * airframe.radius_m * scale
@@ -58,21 +58,21 @@ def thrust_arrows(airframe: VehicleShape, rotors: PerRotor, scale: float) -> Arr
 
 
 def segments(points: Array) -> NDArray[np.float32]:
-    """Join points (n, 3), (n - 1, 2, 3); non-finite points interrupt the line."""
+    """Join points (n, 3) to segments; non-finite points interrupt the line."""
     joined = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
     whole: NDArray[np.float32] = joined[np.isfinite(joined).all(axis=(1, 2))]
     return whole
 
 
 def thinned(points: Array, most: int) -> Array:
-    """Return at most `most` + 1 of points (n, 3), evenly, including the last."""
+    """Return at most `most` + 1 of points (n, 3), with the last."""
     step = -(-len(points) // most) if len(points) > most else 1
     kept: Array = points[::-1][::step][::-1]
     return kept
 
 
 def zone_segments(zone: Zone, bottom_m: float, top_m: float) -> NDArray[np.float32]:
-    """Return a zone's outline at two heights and its upright edges, (n, 2, 3)."""
+    """Return a zone's outline at two heights and its edges, (n, 2, 3)."""
     closed = np.vstack([zone.corners_m, zone.corners_m[:1]])
     rings = [np.column_stack([closed, np.full(len(closed), height)]) for height in (bottom_m, top_m)]
     corners = len(zone.corners_m)
@@ -96,7 +96,7 @@ def ground_point(origin: Vector, direction: Vector, ground_m: float) -> Vector |
 
 
 def bounds(points: Sequence[Array]) -> tuple[Vector, float]:
-    """Return centre and half size of the bounding box of points (n, 3) each; at least 2 m."""
+    """Return centre and half size, 2 m or more, of the box around points (n, 3)."""
     known = [each[np.isfinite(each).all(axis=1)] for each in points]
     filled = [each for each in known if len(each)]
     if not filled:
@@ -108,7 +108,7 @@ def bounds(points: Sequence[Array]) -> tuple[Vector, float]:
 
 
 def outline(around: Surroundings) -> list[Array]:
-    """Return the points that the camera must show, (n, 3) each."""
+    """Return the points to be seen, (n, 3) each."""
     marks = [*around.mission, *around.rally, Mark(around.home_enu_m, "home")]
     zones = [np.column_stack([zone.corners_m, np.full(len(zone.corners_m), around.ground_m)]) for zone in around.fence]
     return [around.path, around.reference_path, np.array([mark.place_enu_m for mark in marks]), *zones]
@@ -120,7 +120,7 @@ def vehicle_scale(extent_m: float, airframe: VehicleShape) -> float:
 
 
 def arrow(place: Vector, vector: Vector, scale: float) -> Array | None:
-    """Return the ends of an arrow, (1, 2, 3); `None` for one of zero or unknown length."""
+    """Return an arrow, (1, 2, 3), unless it is of zero or unknown length."""
     tip = np.array(place) + scale * np.array(vector)
     if not np.isfinite(tip).all() or np.linalg.norm(vector) < 1e-3:
         return None

@@ -13,7 +13,7 @@ _WAIT_S = 0.02
 
 
 class LiveVehicle:
-    """The vehicle at the other end of a link; a `Source`. Telemetry has no airframe."""
+    """The vehicle at the other end of a link; a `Source` without airframe."""
 
     airframe = VehicleShape()
     is_live = True

@@ -1,7 +1,6 @@
-"""The page's end of a MAVLink link: requests telemetry and plans, sends commands.
+"""The page's end of a MAVLink link: requests telemetry and plans, sends commands, without I/O.
 
-No I/O: datagrams and time in, datagrams out. It does not identify as a ground station: closing a browser must not
-trigger a failsafe.
+It does not identify as a ground station: closing a browser must not trigger a failsafe.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -88,7 +87,7 @@ _ABSOLUTE_FRAMES = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
 
 
 class VehicleObserver:
-    """Watches the first vehicle on a link; `surroundings` is a new object after each change."""
+    """Watches the first vehicle; `surroundings` is a new object after each change."""
 
     def __init__(self) -> None:
         self.telemetry = Telemetry()

@@ -30,9 +30,9 @@ EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
 WORDS_HZ = 5.0
 """Update rate of texts and time line, enough to read."""
 PLOTS_HZ = 2.0
-"""Update rate of plots, which are sent whole; the mark moves by a pixel or two."""
+"""Update rate of plots, which are sent whole."""
 PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
-"""Delay from a browser's layout, or at most from its connection, to the first motion, which would slow down drawing."""
+"""Delay of the first motion after a browser's layout, or at most its connection: it slows down drawing."""
 
 
 class Show:
@@ -101,7 +101,7 @@ def play(folders: Sequence[Path], server: PageServer) -> None:
 
 
 def export(folders: Sequence[Path], path: Path) -> None:
-    """Write flights as an HTML file that plays them, without plots."""
+    """Write an HTML file that plays flights, without plots."""
     with ExitStack() as held:
         flights = read_flights(folders, held, wait=True)
         begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
@@ -117,7 +117,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
 
 
 def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
-    """Read flights. Their horizons are computed while `held` is open; `wait` for all."""
+    """Read flights; horizons are computed while `held` is open, or `wait` for all."""
     flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
     for folder, flight in zip(folders, flights, strict=True):
         horizons = Horizons()
@@ -149,10 +149,7 @@ def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
 
 @contextmanager
 def page_beside(say: Callable[[str], None]) -> Iterator[str]:
-    """Show the flight in this block; yield the link for the vehicle to connect to.
-
-    The page runs in a thread of this process, which otherwise only waits for its children.
-    """
+    """Show the flight in this block from a thread; yield the link for the vehicle to connect to."""
     ends = Event()
     with _live_page("udpin:127.0.0.1:0", 0, name="vehicle", browser=True, say=say) as (vehicle, show):
         thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)

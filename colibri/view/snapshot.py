@@ -33,7 +33,7 @@ class VehicleShape(NamedTuple):
 
     @property
     def radius_m(self) -> float:
-        """Radius of a rotor's disc: neighbours almost touch; coaxial ones are none."""
+        """Radius of a rotor's disc: neighbours almost touch."""
         places = np.array(self.rotors_m)
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         return float(0.46 * apart[apart > 0.1 * apart.max()].min())
@@ -77,7 +77,7 @@ class Mark(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """A part of a geofence, with its outline east and north, (n, 2)."""
+    """A part of a geofence; its outline is east and north, (n, 2)."""
 
     corners_m: Array
     keeps_in: bool
@@ -101,10 +101,10 @@ class Chart(NamedTuple):
     """Some series over the same times.
 
     Attributes:
-        title: Quantity and unit; charts of several flights are merged by title.
-        names: Names of the series; in parentheses a limit, drawn grey.
+        title: Quantity and unit; charts of several flights are merged by it.
+        names: Of the series; a limit is in parentheses.
         values: (series, n).
-        headline: The series to show of each of several flights, (n,).
+        headline: What to show of each of several flights, (n,).
     """
 
     title: str
@@ -115,7 +115,7 @@ class Chart(NamedTuple):
 
 
 class Source(Protocol):
-    """A vehicle that can be shown, recorded or live.
+    """A vehicle, recorded or live.
 
     Attributes:
         is_live: Whether time passes by itself.

@@ -38,7 +38,7 @@ _CHARTS = (
 
 
 class Telemetry:
-    """The latest state by messages; `system` is 0 before the first heartbeat."""
+    """The latest state; `system` is 0 before the first heartbeat."""
 
     def __init__(self) -> None:
         self.autopilot: int | None = None
@@ -127,7 +127,7 @@ class Telemetry:
         )
 
     def charts(self) -> tuple[Chart, ...]:
-        """Return the charts of the last minute for which there are messages."""
+        """Return the charts of the last minute."""
         if len(self._rows) < 2:
             return ()
         rows = np.array(self._rows)
@@ -145,7 +145,7 @@ class Telemetry:
         return tuple(charts)
 
     def place_of(self, latitude_deg: float, longitude_deg: float, up_m: float, *, above_sea: bool) -> Vector:
-        """Convert a place to the local frame, ENU; nan without an origin."""
+        """Convert a place to ENU; nan without an origin."""
         if self.origin is None:
             return NOWHERE
         east, north, _ = enu_of(Geodetic(latitude_deg, longitude_deg, self.origin.altitude_m), self.origin)

@@ -6,8 +6,7 @@ import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import SITUATIONS, ChaosFlight, airborne
-from tools.chaos.places import Thrower
+from tools.chaos.flights import SITUATIONS, ChaosFlight, Thrower, airborne
 
 
 def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, str]:

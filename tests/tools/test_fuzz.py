@@ -13,7 +13,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from tests.support.hostile_wire import NOW_S, HostileWire, fly
 from tools.fuzz.campaign import campaign
 from tools.fuzz.datagrams import AUTOPILOT, FRAME_US, PLANT, Fuzzer
-from tools.fuzz.ground import MAX_GROWTH_MIB, growth_mib
+from tools.fuzz.vehicle import MAX_GROWTH_MIB, growth_mib
 
 FRAMES = 50
 

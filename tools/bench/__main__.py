@@ -1,4 +1,4 @@
-"""`python -m tools.bench`, or `make bench`: `colibri bench`, with RotorPy's flights where that is installed."""
+"""`make bench`: `colibri bench` beside RotorPy, if installed."""
 
 import sys
 from collections.abc import Sequence

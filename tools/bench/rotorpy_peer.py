@@ -1,4 +1,4 @@
-"""RotorPy, for comparison: its Hummingbird under its SE(3) controller, in one process."""
+"""RotorPy's Hummingbird under its SE(3) controller."""
 
 import os
 import sys

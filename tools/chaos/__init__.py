@@ -1,1 +1,1 @@
-"""Exceptions thrown into each part of a flight, and the outcome of each flight."""
+"""Exceptions thrown into each part of a flight."""

@@ -1,7 +1,4 @@
-"""`python -m tools.chaos`: exceptions thrown into every place, at many instants of every situation; a table of it.
-
-Each case is a fork of the flight at its instant; flights on state and on sensors run side by side.
-"""
+"""`python -m tools.chaos`: exceptions thrown into every place, at many instants of every situation, each in a fork."""
 
 import argparse
 import json
@@ -16,13 +13,12 @@ from typing import Any
 
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import SITUATIONS, ChaosFlight, airborne
-from tools.chaos.places import PLACES, Thrower
+from tools.chaos.flights import PLACES, SITUATIONS, ChaosFlight, Thrower, airborne
 
 SPAN_S = 4.8
 """Over which the instants of a situation are spread."""
 TIMES = (1.0, inf)
-"""Exceptions thrown from an instant on: one at every other instant, at those between all."""
+"""Exceptions from an instant on: one, or all."""
 
 
 def main() -> int:

@@ -1,1 +1,1 @@
-"""The time that a frame takes of the autopilot, whatever ground stations request."""
+"""Time of a frame, whatever ground stations request."""

@@ -1,4 +1,4 @@
-"""`python -m tools.frames`: the longest frame of each kind of request, in ms of work."""
+"""`python -m tools.frames`: the longest frame of each request, in ms of work."""
 
 import argparse
 import random

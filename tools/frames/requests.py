@@ -1,4 +1,4 @@
-"""Requests of ground stations that cost a vehicle the most, one function for each kind."""
+"""Requests of ground stations that cost a vehicle the most."""
 
 from collections.abc import Callable, Iterator, Mapping
 from math import cos, nan, pi, sin
@@ -22,7 +22,7 @@ FRAMES_BETWEEN = 30
 _LIST, _OPEN, _BURST, _CHECKSUM, _CREATE = 3, 4, 15, 14, 6
 
 Request = Callable[[BareFlight], Iterator[list[bytes]]]
-"""Yields what is sent at each frame: one datagram of all these messages, at most 4 kB of them."""
+"""Yields the messages of each frame, at most 4 kB."""
 
 
 def item(command: int, east_m: float, north_m: float, up_m: float = 10.0, p1: float = 0.0) -> MissionItem:
@@ -59,7 +59,7 @@ class Sender:
         return self("COMMAND_LONG", *TO, number, 0, *params, *(0.0,) * (7 - len(params)))
 
     def sets(self, parameter: Parameter, share: float) -> bytes:
-        """Set a parameter off its default by a share of its value, or to another of its values."""
+        """Set a parameter off its default by a share, or to another value."""
         default = parameter.default
         value = default * (1.0 + share) if isinstance(default, float) else default + 1
         value = min(max(value, parameter.minimum), parameter.maximum)

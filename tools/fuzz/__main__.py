@@ -1,4 +1,4 @@
-"""`python -m tools.fuzz`: the long campaign, one for each of many seeds, side by side."""
+"""`python -m tools.fuzz`: long campaigns of many seeds, side by side."""
 
 import argparse
 import sys

@@ -1,7 +1,9 @@
-"""One flight of two real processes under fire, and its conditions."""
+"""Flights of two real processes under fire, and campaigns by seed."""
 
+import random
 import signal
 import tempfile
+from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
 from time import monotonic, perf_counter, sleep
@@ -10,10 +12,70 @@ from typing import NamedTuple
 import psutil
 
 from colibri.mavlink.files.folder import Folder
-from tools.fuzz.datagrams import FRAME_US
-from tools.fuzz.ground import ground_campaign
-from tools.fuzz.relay import FuzzingRelay, unreadable
+from colibri.mavlink.wire.dialect import Codec
+from tools.fuzz.datagrams import ACTUATORS, ATTITUDE, AUTOPILOT, FRAME_US, PLANT, Fuzzer
+from tools.fuzz.vehicle import ground_campaign
 from tools.harness.processes import Process, fly_thesis, running, start_autopilot, start_plant, states
+from tools.harness.relay import Relay
+
+UNREADABLE = ("malformed", "unknown", "truncated")
+"""Counts of a codec that depend on the datagram alone."""
+
+
+class FuzzingRelay(Relay):
+    """A relay that sends a burst with the first datagram of each moment: at most two wait in a receiver."""
+
+    def __init__(self, plant_url: str, *, burst: int, quota: int, seed: int) -> None:
+        super().__init__(plant_url)
+        self._chance = random.Random(seed)
+        self._fuzzers = {
+            "plant": Fuzzer(self._chance, AUTOPILOT, PLANT),
+            "autopilot": Fuzzer(self._chance, PLANT, AUTOPILOT),
+        }
+        self._twins = {"plant": Codec(*PLANT), "autopilot": Codec(*AUTOPILOT)}
+        self._burst = burst
+        self._quota = quota
+        self._moments_us = dict.fromkeys(self._fuzzers, 0)
+        self.sent = {(to, kind): 0 for to in self._fuzzers for kind in ("random", "hostile")}
+
+    def unreadable(self, to: str) -> dict[str, int]:
+        """Return the counts of the codec of `to` if every datagram arrived."""
+        return unreadable(self._twins[to].dropped)
+
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        moment_us = _moment_us(datagram)
+        datagrams = []
+        if moment_us > self._moments_us[to]:
+            self._moments_us[to] = moment_us
+            datagrams = self._bad(to, moment_us, datagram)
+        datagrams.insert(self._chance.randint(0, len(datagrams)), datagram)
+        for each in datagrams:
+            self.deliver(to, each)
+
+    def _bad(self, to: str, moment_us: int, good: bytes) -> list[bytes]:
+        fuzzer, datagrams = self._fuzzers[to], []
+        fuzzer.moment_us, fuzzer.good = moment_us, good
+        for number in range(self._burst):
+            kind = "hostile" if number % 2 else "random"
+            if self.sent[to, kind] < self._quota:
+                self.sent[to, kind] += 1
+                datagrams.append(fuzzer.hostile() if kind == "hostile" else fuzzer.random())
+                self._twins[to].decode(datagrams[-1])
+        return datagrams
+
+
+def unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
+    return {reason: dropped.get(reason, 0) for reason in UNREADABLE}
+
+
+def _moment_us(datagram: bytes) -> int:
+    message_id = int.from_bytes(datagram[7:10], "little")
+    if message_id == ACTUATORS:
+        return int.from_bytes(datagram[10:18], "little")
+    if message_id == ATTITUDE:
+        return int.from_bytes(datagram[10:14], "little") * 1000
+    return 0
+
 
 MAX_GROWTH_MIB = 4.0
 _MARGIN = 1.05
@@ -30,10 +92,7 @@ class FuzzOutcome(NamedTuple):
 
 
 def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> FuzzOutcome:
-    """Fly until `quota` datagrams of each kind were sent to each process; compare with an undisturbed flight.
-
-    With each good datagram goes a `burst`, half of each kind.
-    """
+    """Fly until each process was sent `quota` datagrams of each kind, a `burst` with each good one, and compare."""
     duration_s = (10 + ceil(_MARGIN * 2 * quota / burst)) * FRAME_US / 1e6
     logs = folder / "logs"
     logs.mkdir()
@@ -61,7 +120,7 @@ def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> FuzzOutcome:
 
 
 def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
-    """Return the failure if the flight ends or stalls before `time_s`."""
+    """Return the failure of a flight that ends or stalls early."""
     flown_s, moved_at_s = -1.0, monotonic()
     while flown_s < time_s:
         sleep(_LOOK_EVERY_S)
@@ -84,7 +143,7 @@ def _end(processes: dict[str, Process]) -> list[str]:
 
 
 def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]:
-    """Compare unreadable datagrams sent and counted: equal only if all arrived."""
+    """Compare unreadable datagrams sent and counted."""
     failures = []
     for name, process in processes.items():
         counted = unreadable(process.events("ended")[-1]["dropped"])
@@ -125,7 +184,7 @@ HEADER = f"{'fired at':<16}{'seed':>6}{'sent':>10}{'MiB before':>12}{'after':>9}
 
 
 class Job(NamedTuple):
-    """A campaign with one seed, from the peer or from ground stations."""
+    """A campaign from the peer or from ground stations."""
 
     seed: int
     datagrams: int  # of each kind, to each process; 0: messages instead

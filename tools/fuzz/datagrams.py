@@ -1,6 +1,6 @@
 """Hostile datagrams: random bytes, and frames with a right CRC and wrong content.
 
-A valid message for the awaited moment is left out: only signing could tell it from the peer's.
+A valid message for the awaited moment is left out: only signing could tell it apart.
 """
 
 import random
@@ -24,7 +24,7 @@ _CRC_EXTRA_OF_THE_UNKNOWN = 0
 
 
 def frame(message_id: int, payload: bytes, source: Ids, *, sequence: int = 0, flags: int = 0) -> bytes:
-    """Return a MAVLink 2 frame with a right CRC, without the signature that flag 1 promises."""
+    """Return a MAVLink 2 frame, without the signature of flag 1."""
     header = struct.pack("<BBBBBB", len(payload), flags, 0, sequence, *source) + message_id.to_bytes(3, "little")
     return b"\xfd" + header + payload + _crc(header + payload, message_id)
 
@@ -55,7 +55,7 @@ _QUATERNIONS = ((1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.0, 0.6, 0.8, 0.0)
 
 
 class Fuzzer:
-    """Random datagrams for one `receiver`, and hostile ones in the name of its `peer`."""
+    """Datagrams for one `receiver`, in the name of its `peer`."""
 
     def __init__(self, chance: random.Random, peer: Ids, receiver: Ids) -> None:
         self._chance = chance
@@ -91,7 +91,7 @@ class Fuzzer:
         return bytes(spoilt)
 
     def hostile(self) -> bytes:
-        """Return one to three frames with right CRCs and wrong contents."""
+        """Return up to three frames with wrong contents."""
         # The same half all along a datagram: a receiver takes the last of each, and two good ones would be a frame.
         self._attitude_is_broken = self._chance.random() < 0.5
         return b"".join(self._chance.choice(self._kinds)() for _ in range(self._chance.choice((1, 1, 1, 2, 3))))
@@ -102,7 +102,7 @@ class Fuzzer:
         return frame(message_id, payload, self._peer, sequence=self._chance.randrange(256))
 
     def _wrong_length(self) -> bytes:
-        """Return a message cut short, which MAVLink fills with zeros, or one that is too long."""
+        """Return a message that is cut short or too long."""
         length = self._chance.choice((0, 1, self._chance.randrange(2, 12), self._chance.randrange(256), 255))
         payload = self._chance.choice((b"\xff" * length, self._chance.randbytes(length)))
         return frame(self._chance.choice(_CONVERSATION), payload, self._peer)
@@ -117,7 +117,7 @@ class Fuzzer:
         return self._valid_state(self.moment_us, source) + self._valid_actuators(self.moment_us, source)
 
     def _state(self) -> bytes:
-        """Return both halves of a frame: one broken, one missing, or the frame out of step."""
+        """Return a frame with a broken or missing half, or out of step."""
         kind = self._chance.randrange(3)
         if kind == 0:
             return self._valid_state(self._another_moment_us(), self._peer)
@@ -132,7 +132,7 @@ class Fuzzer:
         return self._chance.choice((attitude + position, position + attitude, attitude, position))
 
     def _actuators(self) -> bytes:
-        """Return an impossible control for this moment, or a command for another moment."""
+        """Return an impossible control, or one for another moment."""
         if self._chance.random() < 0.5:
             return self._valid_actuators(self._another_moment_us(), self._peer)
         controls = [self._chance.random() for _ in range(16)]
@@ -140,7 +140,7 @@ class Fuzzer:
         return frame(ACTUATORS, pack("<QQ16fB", self.moment_us, 1, *controls, 0xFF), self._peer)
 
     def _command(self) -> bytes:
-        """Return any command, or another frame interval, which must be refused in flight."""
+        """Return any command, or another frame interval."""
         command = self._chance.choice((_SET_MESSAGE_INTERVAL, 400, self._chance.randrange(65536)))
         message_id = self._chance.choice((float(ATTITUDE), self._value()))
         interval_us = self._chance.choice((1000.0, 50_000.0, 1e6, self._value()))
@@ -154,7 +154,7 @@ class Fuzzer:
         return frame(ACK, pack("<H", command) + self._chance.randbytes(8), self._peer)
 
     def _flagged(self) -> bytes:
-        """Return a frame flagged as signed, with a random signature, or with unknown flags."""
+        """Return a frame with a random signature or unknown flags."""
         flags = self._chance.choice((1, 1, 1, self._chance.randrange(2, 256)))
         signature = self._chance.randbytes(13) if flags & 1 else b""
         time_us = self._another_moment_us()
@@ -168,7 +168,7 @@ class Fuzzer:
         return frame_v1(message_id, self._chance.randbytes(payload_size(message_id)), self._peer)
 
     def _another_moment_us(self) -> int:
-        """Return a moment that the receiver neither awaits nor soon will."""
+        """Return a moment that is not awaited."""
         chance = self._chance
         past = self.moment_us - FRAME_US * chance.randrange(1, 100)
         future = self.moment_us + FRAME_US * chance.randrange(10, 1000)

@@ -28,7 +28,7 @@ STANDING = Start()
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 _AS_IT_IS = load_profile("flight")
 _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
-"""A frame for each control sample, without frames between: a third less to compute."""
+"""No frames between control samples: a third less to compute."""
 
 
 class BareFlight(Stepped, Steered):

@@ -1,4 +1,4 @@
-"""Commands that a vehicle may accept, stated independently of the code that accepts them."""
+"""Commands that a vehicle may accept, by an independent table."""
 
 from collections.abc import Callable, Mapping
 from math import isfinite, isnan, nan, pi
@@ -14,7 +14,7 @@ _WITHOUT_PLACE = mav.MAV_FRAME_MISSION
 
 
 class CommandParameters(NamedTuple):
-    """Parameters of a COMMAND_LONG or COMMAND_INT; x and y in degrees, nan if missing."""
+    """Parameters of a command; x and y in degrees, nan if missing."""
 
     p1: float
     p2: float
@@ -87,7 +87,7 @@ SENSIBLE: Mapping[int, Callable[[CommandParameters], bool]] = {
     mav.MAV_CMD_DO_SET_MISSION_CURRENT: lambda a: _whole(-1, 65535)(a.p1) and _nan_or(a.p2, _one_of(0.0, 1.0)),
     mav.MAV_CMD_DO_SET_STANDARD_MODE: lambda a: _whole(1, 8)(a.p1),
 }
-"""By MAV_CMD: whether such parameters make sense. The parameters of other commands do not matter."""
+"""By MAV_CMD: whether such parameters make sense."""
 HARMLESS: tuple[int, ...] = (
     mav.MAV_CMD_NAV_LAND,
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH,

@@ -1,1 +1,1 @@
-"""The golden flights as on other computers: libraries and kernels chosen for other CPUs, hashes compared."""
+"""Golden flights as on other computers."""

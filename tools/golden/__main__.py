@@ -1,4 +1,4 @@
-"""`make golden`: the golden flights under every variation, and how long each took; 1 if any hash differs."""
+"""`make golden`: golden flights under every variation; 1 if any hash differs."""
 
 import argparse
 import subprocess

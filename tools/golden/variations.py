@@ -1,4 +1,4 @@
-"""Other computers, simulated: choices that libraries make by the CPU are forced; and other Python versions."""
+"""Other computers, simulated: choices by the CPU are forced; and other Python versions."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from colibri.verification.golden import FOUND
 MIN_MINOR, MAX_MINOR = 11, 19
 """Minor versions of Python 3 to look for."""
 _MADE_FROM = ("requirements.lock", "pyproject.toml")
-"""Sources of an environment: if it is older, it is stale."""
+"""An environment older than these is stale."""
 _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 
@@ -85,7 +85,7 @@ ROOT = Path(__file__).parents[2]
 HASHES = ROOT / "tests" / "golden" / "hashes.json"
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 NO_AVX2_NOR_FMA = "glibc.cpu.hwcaps=-AVX2_Usable,-AVX2,-FMA_Usable,-FMA,-FMA4_Usable,-FMA4,-AVX512F_Usable,-AVX512F"
-"""glibc before 2.33 has the names that end in _Usable; each passes over the others."""
+"""Names that end in _Usable are those of glibc before 2.33."""
 _AVX2 = ("avx2", "fma")
 _AVX512 = (*_AVX2, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
 
@@ -103,19 +103,19 @@ class Variation:
     python: Path = Path(sys.executable)
 
     def obstacle(self) -> str:
-        """Return why it cannot be flown here; empty if it can."""
+        """Return why it cannot be flown here, if so."""
         missing = [flag for flag in self.needs if flag not in cpu_flags()]
         return self.lacks or (f"this CPU has no {', '.join(missing)}" if missing else "")
 
 
 class GoldenHashes(NamedTuple):
-    """Hash of each golden flight, empty if it did not end, and the duration with compilation."""
+    """Hash of each flight, empty if it did not end, and the duration."""
 
     hashes: dict[str, str]
     took_s: float
 
     def differing(self) -> dict[str, tuple[str, str]]:
-        """Return the expected and the found hash of each flight that differs."""
+        """Return expected and found hashes that differ."""
         golden: dict[str, str] = json.loads(HASHES.read_text(encoding="utf-8"))
         return {name: (golden[name], found) for name, found in self.hashes.items() if found != golden[name]}
 
@@ -149,7 +149,7 @@ _NUMBA_CPUS = {"generic": (), "haswell": _AVX2, "skylake-avx512": _AVX512}
 
 
 def _numpy_without_simd() -> Variation:
-    """Disable the features that numpy found: others must not be named."""
+    """Disable the features that numpy found."""
     found: list[str] = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Variation(
         name="numpy-without-simd",
@@ -159,7 +159,7 @@ def _numpy_without_simd() -> Variation:
 
 
 def _numba(cpu: str, needs: Sequence[str]) -> Variation:
-    """Compile kernels for a CPU; empty features restrict them to its own."""
+    """Compile kernels for a CPU with its own features."""
     kept = Path(sys.prefix) / "golden-kernels" / cpu
     environment = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kept)}
     lacks = "" if platform.machine() in ("x86_64", "AMD64") else "not an x86 CPU"

@@ -1,1 +1,1 @@
-"""Flights for fuzzing, soaking and tests: a vehicle in this process, processes, relays, observers."""
+"""Vehicles, processes, relays and observers for tests and tools."""

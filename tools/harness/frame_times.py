@@ -8,7 +8,7 @@ from typing import Any
 
 
 class FrameTimes(list[float]):
-    """Work of an autopilot in each frame, s: its answer, and then what it does for ground stations."""
+    """Work of an autopilot in each frame, s: answer and ground stations."""
 
     def __init__(self, autopilot: Any) -> None:
         super().__init__()

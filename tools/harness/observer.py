@@ -1,4 +1,4 @@
-"""Observes a vehicle on a separate link: clients are judged by it."""
+"""Observes a vehicle on a separate link."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -49,7 +49,7 @@ class Sight(NamedTuple):
 
 
 class Observer(OnPort):
-    """Records the messages of a vehicle to a port of this computer."""
+    """Records the messages of a vehicle."""
 
     def __init__(self) -> None:
         super().__init__(self)
@@ -71,14 +71,14 @@ class Observer(OnPort):
         return int(self._latest["GPS_RAW_INT"].fix_type)
 
     def modes(self) -> list[Mode]:
-        """Return the modes of armed heartbeats, without repetition: one is sent at every change."""
+        """Return the modes of armed heartbeats, without repetition."""
         return list(self._modes)
 
     def in_mode(self, mode: Mode) -> list[Sight]:
         return [sight for sight in self.sights if sight.mode is mode and sight.armed and sight.flying]
 
     def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
-        """Return the first sight from now on that meets `condition`; `within_s` only bounds hangs."""
+        """Return the first sight from now on that meets a condition; `within_s` only bounds hangs."""
         with self._news:
             seen = len(self.sights) - 1
             give_up_s = monotonic() + within_s
@@ -93,7 +93,7 @@ class Observer(OnPort):
                 self._news.wait(left_s)
 
     def wait_until_disarmed(self) -> Sight:
-        """Return the first sight after a flight: sights may lag behind a client."""
+        """Return the first sight after a flight."""
         return self.wait(lambda sight: not sight.armed and any(it.armed for it in self.sights), "the end of the flight")
 
     @property
@@ -102,7 +102,7 @@ class Observer(OnPort):
         return self._client.vehicle.target
 
     def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
-        """Return the first `answer` after a message with target ids and `fields`."""
+        """Return the `answer` to a message with target ids."""
         with self._news:
             before = self.counts[answer]
             self.send(self._client.encode(name, *self._vehicle, *fields))

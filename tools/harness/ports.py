@@ -1,4 +1,4 @@
-"""UDP ports of this computer for clients without input or output."""
+"""UDP ports for clients without I/O."""
 
 import socket
 from select import select
@@ -11,7 +11,7 @@ _BUFFER_BYTES = 4_000_000
 
 
 def bound_socket() -> tuple[socket.socket, str]:
-    """Return a socket on a free port, and the URL by which others call it."""
+    """Return a socket on a free port, and its URL."""
     bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
     bound.bind(("127.0.0.1", 0))
@@ -25,7 +25,7 @@ class Talker(Protocol):
 
 
 class OnPort:
-    """Connects a client, within a block, to the vehicle that serves `url`."""
+    """Connects a client, within a block, to a vehicle that serves `url`."""
 
     def __init__(self, talker: Talker) -> None:
         self.sender: tuple[str, int] | None = None

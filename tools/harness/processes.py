@@ -1,4 +1,4 @@
-"""Flights for tests: one command line in, report and rows out."""
+"""Flights by command lines, with report and rows."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 GIVE_UP_AFTER_S = 60.0
 begins_as_recorded = pytest.mark.skipif(nudge_m() != 0.0, reason="compares with a flight that began at its start")
-"""For tests that compare with recorded flights more closely than COLIBRI_NUDGE_M moves the start."""
+"""COLIBRI_NUDGE_M moves the start further than these tests permit."""
 THESIS_PLANT = (
     *("--vehicle", "hummingbird-thesis"),
     *("--integrator", "adaptive"),
@@ -54,7 +54,7 @@ def rows(path: Path) -> dict[str, Array]:
 
 
 def topic_rows(log: Path, topic: Topic = TRUTH) -> dict[str, Array]:
-    """Read a topic of a log, or of the log in a flight's folder, as columns."""
+    """Read a topic of a log, or of a flight's folder, as columns."""
     flown = FlightFile(log / FILE if log.is_dir() else log)
     return dict(zip(topic.names, read_series(flown, topic, *topic.names), strict=True))
 
@@ -69,7 +69,7 @@ def max_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: t
 
 
 def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_AFTER_S / 3600.0) -> None:
-    """Wait until `condition()`; the bound is never part of a verdict."""
+    """Wait; the bound is never part of a verdict."""
     give_up_s = monotonic() + 3600.0 * hours
     while not condition():
         assert monotonic() < give_up_s, f"waited in vain for {what}"

@@ -1,4 +1,4 @@
-"""A UDP relay between autopilot and plant, which damages the traffic."""
+"""A UDP relay that damages the traffic."""
 
 import random
 from abc import ABC, abstractmethod
@@ -26,7 +26,7 @@ class Relay(ABC):
 
     @abstractmethod
     def pass_on(self, to: str, datagram: bytes) -> None:
-        """Handle a datagram for the `plant` or the `autopilot`, by `deliver`."""
+        """Handle a datagram for `plant` or `autopilot`."""
 
     def deliver(self, to: str, datagram: bytes) -> None:
         if to == "plant":

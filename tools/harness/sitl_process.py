@@ -62,7 +62,7 @@ class SitlProcess:
 def vehicle(
     folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0
 ) -> Iterator[SitlProcess]:
-    """Run `colibri sitl` within a block, ready to be armed; its state and output are in `folder`."""
+    """Run `colibri sitl` within a block, ready to be armed, with its files in `folder`."""
     said, printed, state = folder / "sitl.err", folder / "sitl.out", folder / "state"
     with Observer() as seen, said.open("wb") as errors, printed.open("wb") as output:
         command = [

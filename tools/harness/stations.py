@@ -1,4 +1,4 @@
-"""Ground stations that request a lot and count the answers, whatever the speed of the vehicle."""
+"""Ground stations that request a lot and count the answers."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +42,7 @@ class HarnessStation:
         every: int = 25,
         orders: Sequence[tuple[float, ...]] = (),
     ) -> None:
-        """Send a request with every `every`-th datagram: first `orders` (MAV_CMD, parameters), then all kinds."""
+        """Send with every `every`-th datagram first `orders` (MAV_CMD, parameters), then all kinds."""
         self.identity = (system_id, component_id)
         self.sent: Counter[int] = Counter()
         self.counts: Counter[str] = Counter()
@@ -108,7 +108,7 @@ class HarnessStation:
 
 
 class CirclingCompanion(HarnessStation):
-    """A companion that flies a circle by setpoints; `off_m` is its largest error."""
+    """A companion that flies a circle; `off_m` is its largest error."""
 
     def __init__(self, system_id: int) -> None:
         super().__init__(system_id, mav.MAV_COMP_ID_ONBOARD_COMPUTER, orders=[OFFBOARD, ARM])

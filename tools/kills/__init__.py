@@ -1,1 +1,1 @@
-"""Processes killed in flight, again and again: motion of the vehicle, end of its flight."""
+"""Processes killed in flight, again and again."""

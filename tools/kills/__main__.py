@@ -1,4 +1,4 @@
-"""`python -m tools.kills`: autopilots or plants killed in flight, again and again, and what came of it."""
+"""`python -m tools.kills`: autopilots or plants killed in flight."""
 
 import argparse
 import sys
@@ -15,7 +15,7 @@ from tools.kills.between import HangsError
 from tools.kills.flights import AutopilotKill, KilledMission, PlantKill, fly_autopilots, fly_plants
 
 MAX_TILT_DEG = 35.0 + 45.0
-"""45° more than the largest tilt that a pilot may ask for."""
+"""45° more than a pilot may ask for."""
 MAX_LOST_M = 2.0
 _PLANTS_A_FLIGHT = 10
 

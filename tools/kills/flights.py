@@ -14,8 +14,7 @@ from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.flight_record import tilt_deg
 from tools.harness.processes import Process, topic_rows
-from tools.kills.between import COMPILES_S, Between, KillInstant
-from tools.kills.station import HOVERS, LEGS, KillStation, mission
+from tools.kills.between import COMPILES_S, HOVERS, LEGS, Between, KillInstant, KillStation, mission
 
 _APART_S, _SPREAD_S = 1.8, 1.6
 _JUDGED_S = 2.0
@@ -48,7 +47,7 @@ class KilledMission(NamedTuple):
 def _killing(
     folder: Path, station: KillStation, seed: int, out: Path | None = None
 ) -> Iterator[tuple[list[Process], Between, str]]:
-    """Start a plant, and a relay before it; yield the processes, to which others are added, the relay and its URL."""
+    """Start plant and relay; yield the processes, the relay and its URL."""
     folder.mkdir()
     processes = [start_plant(folder, "udpin:127.0.0.1:0", seed, out)]
     try:
@@ -68,7 +67,7 @@ def _armed(station: KillStation) -> Callable[[], bool]:
 
 
 def fly_autopilots(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> KilledMission:
-    """Fly a mission, and kill the autopilot again and again until its end."""
+    """Fly a mission, and kill the autopilot again and again."""
     station, chance, kills = KillStation(mission(legs)), random.Random(seed), list[_Killed]()
     with _killing(folder, station, seed, out=folder) as (processes, between, _):
 
@@ -168,7 +167,7 @@ class PlantKill(NamedTuple):
 
 
 def fly_plants(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[PlantKill], str]:
-    """Kill the plant again and again; start another at once, or after the autopilot's report."""
+    """Kill the plant again and again; start another at once, or after a report."""
     chance, station, done = random.Random(seed), KillStation(mission()), list[PlantKill]()
     with _killing(folder, station, seed) as (processes, between, url):
         autopilot = start(folder, between.url, station, feedback)

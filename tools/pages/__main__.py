@@ -1,4 +1,4 @@
-"""`python -m tools.pages PAGE FOLDER`: write generated tables and pictures of PAGE into FOLDER."""
+"""`python -m tools.pages PAGE FOLDER`: write generated parts of PAGE."""
 
 import sys
 from importlib import import_module

@@ -84,7 +84,7 @@ def draw(path: Path) -> None:
 
 
 def _leading_to(action: Action) -> tuple[str, str]:
-    """Return the default conditions of an action, and the possible ones."""
+    """Return the default and the possible conditions of an action."""
     default = [str(row.condition) for row in TABLE if dict(row.choices)[row.default] is action]
     able = [
         str(row.condition)

@@ -40,7 +40,7 @@ def _kind(kind: int) -> str:
 
 
 def _numbers(row: FaultRow) -> str:
-    """Return the numbers of a row; the axes of a vector as one."""
+    """Return the numbers of a row, a vector as one."""
     if len(row.values) == len("xyz"):
         name = row.values[0].name.removesuffix(" x")
         return _number(row.values[0], f"{name} x, y, z", ", ".join(f"{value.usual:g}" for value in row.values))

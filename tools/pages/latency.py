@@ -26,7 +26,7 @@ _SHOWN_MS = (0, 8, 16, 24, 40, 60, 100)
 LOST_M = 5.0
 _WRONG_MS = 5.0
 _SETTLED = 3.0
-"""Factor on the error without delay that is still flown well, and an error that always is."""
+"""Factor on the error without delay, and an error, that are still good."""
 _WELL_M = 1e-3
 
 
@@ -45,7 +45,7 @@ LEMNISCATE = LatencyCase("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0
 
 
 class LatencyFlight(NamedTuple):
-    """A flight of the sweep; `told_ms` is the delay to compensate, `None` to measure it."""
+    """A flight; `told_ms` is the delay to compensate, `None` to measure it."""
 
     law: str
     case: LatencyCase
@@ -54,7 +54,7 @@ class LatencyFlight(NamedTuple):
 
 
 class SweepPoint(NamedTuple):
-    """RMS errors, m, of both flights of a law at one round trip; `None` if the vehicle was lost."""
+    """RMS errors, m, of both flights at a round trip; `None` if lost."""
 
     law: str
     way: str
@@ -78,7 +78,7 @@ def told_ms(way: str, round_trip_ms: float) -> float | None:
 
 
 def merit(recording: Recording, case: LatencyCase) -> float | None:
-    """Return the RMS error from `judged_from_s` on, m; `None` of a lost vehicle."""
+    """Return the RMS error from `judged_from_s` on, m, unless lost."""
     error, t = recording.position_error_m, recording["t"]
     upright = np.cos(recording["phi"]) * np.cos(recording["theta"])
     judged = t >= case.judged_from_s
@@ -137,7 +137,7 @@ def _row(points: Sequence[SweepPoint], law: str, ms: float) -> tuple[str, ...]:
 
 
 def _is_well(point: SweepPoint, points: Sequence[SweepPoint]) -> bool:
-    """Whether the errors are within three times the errors without delay, or a millimetre."""
+    """Whether the errors are at most three times those without delay."""
     first = next(it for it in points if (it.law, it.way, it.round_trip_ms) == (point.law, "not", 0))
     if point.step is None or point.lemniscate is None or first.step is None or first.lemniscate is None:
         return False

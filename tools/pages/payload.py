@@ -1,4 +1,4 @@
-"""`flight-payload.png`: a payload picked up and dropped by profile `flight`, in hover and on a track."""
+"""`flight-payload.png`: a payload picked up and dropped."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class Laden(NamedTuple):
 
 
 def fly(track: str | None, *, learns: bool, seconds: tuple[float, float, float]) -> Laden:
-    """Fly a track, `None` for hover; `seconds` are the times of pick-up, drop and end."""
+    """Fly a track or hover; `seconds` are pick-up, drop and end."""
     picked_up_s, dropped_s, end_s = seconds
     params = {} if learns else {"LPV_MASS_RATE": 0.0}
     with Flights(Setting(airborne=HEIGHT_M, track=track, params=params), None) as flights:

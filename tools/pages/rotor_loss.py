@@ -32,11 +32,11 @@ from tools.pages.tables import with_tables
 
 HEIGHT_M = 10.0
 UPRIGHT_DEG, NEAR_M, SOFT_M_S = 20.0, 5.0, 2.0
-"""What must hold: tilt once settled, distance at touch-down, speed there."""
+"""Largest tilt once settled, distance and speed at touch-down."""
 SETTLED_S = 1.0
-"""So long after the loss the vehicle is to be upright for good."""
+"""After the loss; then the vehicle is upright for good."""
 COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
-"""Of a path: s since the loss, m from its place (z above ground), m/s, degrees, rad/s, parts of the largest."""
+"""s since the loss, m from its place (z above ground), m/s, degrees, rad/s, parts of the largest."""
 _T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)
 _BLADES_LEFT = 0.001
 _BEFORE_S, _AFTER_S, _MAX_DURATION_S = 1.0, 1.5, 40.0
@@ -253,7 +253,7 @@ def _cells(flown: Sequence[RotorLossFlight]) -> list[str]:
 
 
 def write(folder: Path) -> bool:
-    """Return whether every flight was well, except in the last case."""
+    """Return whether all but the last case went well."""
     flown = fly_all(CASES, SEEDS)
     path = folder / "rotor-loss.md"
     path.write_text(with_tables(path.read_text(encoding="utf-8"), [table(flown)]), encoding="utf-8")

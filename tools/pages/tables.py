@@ -7,7 +7,7 @@ _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def with_body(page: str, body: Iterable[str], *, first: str = "## ", last: str = "") -> str:
-    """Replace the lines from one that begins with `first` on, up to one that begins with `last`."""
+    """Replace the lines from `first` up to `last`."""
     head = page[: page.index(f"\n{first}") + 1]
     text = head + "".join(f"{line}\n" for line in body)
     return text + page[page.index(f"\n{last}") + 1 :] if last else text.rstrip("\n") + "\n"
@@ -18,7 +18,7 @@ def cell(text: str) -> str:
 
 
 def with_tables(page: str, tables: Iterable[str]) -> str:
-    """Replace tables of a page, each the next one with the same headings."""
+    """Replace tables, each the next with its headings."""
     ahead = list(tables)
 
     def newest(found: re.Match[str]) -> str:

@@ -26,7 +26,7 @@ _COLORS = {"light": "#E69F00", "moderate": "#0072B2", "severe": "#D55E00"}
 
 
 def blow(weather: Weather, duration_s: float) -> tuple[Array, Array]:
-    """Return times, s, (n,), and velocities of the air, ENU, m/s, (n, 3), at a standing vehicle at 10 feet."""
+    """Return times, s, (n,), and velocities of the air at 10 feet, ENU, m/s, (n, 3)."""
     air = Air(weather)
     velocity, eddies = air.begin(_HEIGHT_M)
     velocities = [velocity]

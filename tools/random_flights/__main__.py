@@ -1,7 +1,7 @@
-"""`python -m tools.random_flights`: flights drawn by seeds, each with failures, parameters, modes and wind.
+"""`python -m tools.random_flights`: flights by seeds, each with failures, parameters, modes and wind.
 
-Each must raise no exception, report an impact, keep its fence as far as it can brake, be disarmed at its end, and take
-at most 20 ms of work for a frame. With at most one failed sensor it must not fall, hit the ground or overturn.
+Each must raise nothing, report an impact, keep its fence as far as it can brake, be disarmed at its end, and take at
+most 20 ms a frame. With at most one failed sensor it must not fall, hit the ground or overturn.
 """
 
 import argparse
@@ -38,7 +38,7 @@ def main() -> int:
 
 
 def _flown(case: RandomFlight) -> tuple[RandomFlightOutcome, float]:
-    """Return a flight and its longest frame, ms; one that seems too long counts only if it is so again."""
+    """Return a flight and its longest frame, ms, of two flights if it seems too long."""
     with gc_off():
         verdict = fly(case)
         frames_s = verdict.frames_s

@@ -61,7 +61,7 @@ class RandomFlight(NamedTuple):
 
     @property
     def lands(self) -> bool:
-        """Whether the vehicle should land whatever happens: at most one sensor fails, and no parameter asks to fall."""
+        """Whether it should land: at most one sensor fails, and no parameter asks to fall."""
         if self.may_fall:
             return False
         failed = [str(event.values[0]) for event in self.events if event.what == "inject"]
@@ -128,7 +128,7 @@ def _value(chance: random.Random, parameter: Parameter) -> Value:
 
 
 MAX_IMPACT_M_S = 4.0
-"""What the vehicle calls an impact is 3 m/s, by its estimate."""
+"""The vehicle reports 3 m/s, by its estimate."""
 MAX_TILT_DEG = 75.0
 AIRBORNE_M, NEAR_GROUND_M, TOUCHING_M = 1.0, 0.15, 0.03
 AFTER_S = 5.0

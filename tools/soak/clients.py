@@ -1,4 +1,4 @@
-"""Two ground stations and an offboard companion on one vehicle, for as long as is asked for: `make soak-clients`."""
+"""`make soak-clients`: two ground stations and a companion on one vehicle."""
 
 import argparse
 import json
@@ -53,7 +53,7 @@ def faults(crew: Iterable[HarnessStation]) -> list[str]:
 
 
 def without_battery(folder: Path) -> Path:
-    """Write the Hummingbird's file without its battery, which would last 9 minutes."""
+    """Write the Hummingbird's file without its battery."""
     path = folder / "tireless.toml"
     path.write_text(_VEHICLE.read_text(encoding="utf-8").partition("[battery]")[0], encoding="utf-8")
     return path

@@ -1,4 +1,4 @@
-"""`make soak`: the whole suite again and again, in memory and over UDP: no verdict and no hash may differ."""
+"""`make soak`: the whole suite again and again; no verdict and no hash may differ."""
 
 import argparse
 import os

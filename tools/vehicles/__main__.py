@@ -1,7 +1,7 @@
-"""`python -m tools.vehicles FOLDER`: whether a control law flies every vehicle of a folder of vehicle files.
+"""`python -m tools.vehicles FOLDER`: whether a law flies every vehicle of a folder.
 
-Every flight starts with the rotors at hover, 2 m off its track. Lemniscates require 60 % of the acceleration that the
-vehicle has. A flight is lost if it ends in the air 2 m from its reference or more, upside down, or on the ground.
+Flights start in hover 2 m off the track. Lemniscates require 60 % of the vehicle's acceleration. A flight is lost if
+it ends 2 m from its reference or more, upside down, or on the ground.
 """
 
 import sys
@@ -46,14 +46,14 @@ class Trial(NamedTuple):
 
 
 def acceleration_m_s2(vehicle: Vehicle) -> float:
-    """Return the horizontal acceleration in level flight with a sagging battery, within a tilt of 65°."""
+    """Return the horizontal acceleration with a sagging battery, within a tilt of 65°."""
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     ratio = float(vehicle.max_wrench()[0]) * BatteryModel(vehicle).max_common_speed(0.0) ** 2 / weight_n
     return vehicle.gravity_m_s2 * min(sqrt(max(ratio * ratio - 1.0, 0.01)), tan(radians(_MAX_TILT_DEG)))
 
 
 def lemniscate(vehicle: Vehicle) -> str:
-    """Return the lemniscate of 4 m, whose largest acceleration is 400 m/s² at a lap of 1 s."""
+    """Return the lemniscate of 4 m, which takes 400 m/s² at a lap of 1 s."""
     return f"lemniscate:height={HEIGHT_M:g},lap={sqrt(400.0 / (_PART * acceleration_m_s2(vehicle))):.2f}"
 
 

@@ -1,1 +1,1 @@
-"""A flight of any length in bounded memory, for judging and for figures."""
+"""Flights of any length in bounded memory."""

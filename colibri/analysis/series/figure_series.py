@@ -1,4 +1,4 @@
-"""Contents of a flight's figures as named series, reduced to the points that a figure can show."""
+"""Series of a flight's figures, reduced to the points that can be shown."""
 
 from collections.abc import Iterable
 from typing import TypeAlias
@@ -22,10 +22,7 @@ _AT_ONCE = 1024
 
 
 class Extremes:
-    """Rows over time; beyond `most`, a multiple of 4, the extremes of each column in equal spans.
-
-    A span keeps two points, in order. While spans are narrower than a pixel, the curve covers the same pixels.
-    """
+    """Rows over time; beyond `most`, a multiple of 4, the two extremes of each column in spans below a pixel."""
 
     def __init__(self, columns: int, most: int) -> None:
         self._points: Array = np.empty((most, columns))
@@ -45,7 +42,7 @@ class Extremes:
             self._count += 2 * spans
 
     def points(self) -> list[Array]:
-        """Return parts of (k, columns): all rows, or two points a span."""
+        """Return all rows, or two a span, in parts of (k, columns)."""
         rest = _extremes(self._rest, len(self._rest)) if len(self._rest) > 1 else self._rest
         return [self._points[: self._count], rest]
 
@@ -58,7 +55,7 @@ class Extremes:
 
 
 class EveryNth:
-    """Rows; beyond `most`, every second, fourth or eighth row, and the last."""
+    """Rows; beyond `most` every second, fourth or eighth, and the last."""
 
     def __init__(self, columns: int, most: int) -> None:
         self._most = most
@@ -84,7 +81,7 @@ class EveryNth:
 
 
 def _extremes(rows: Array, span: int) -> Array:
-    """Return minimum and maximum of each `span` of n rows, by columns, in order, (2 n / span, columns)."""
+    """Return the extremes of each `span` of n rows, by columns, in order, (2 n / span, columns)."""
     spans = rows.reshape(-1, span, rows.shape[1])
     places = np.sort(np.stack([spans.argmin(axis=1), spans.argmax(axis=1)], axis=1), axis=1)
     return np.take_along_axis(spans, places, axis=1).reshape(-1, rows.shape[1])
@@ -99,9 +96,9 @@ ATTITUDE = ("phi", "theta", "psi")
 START_S = 10.0
 """Enlarged start, kept complete."""
 MAX_POINTS = 1 << 14
-"""Points over time after the start: 130 s at 125 Hz, always several for each pixel of a figure's width."""
+"""Points after the start: several for each pixel."""
 MAX_PATH_POINTS = 1 << 16
-"""Points of a path in space: for an hour at 5 m/s², chords are off by less than a pixel."""
+"""Points of a path: for an hour, chords are off by less than a pixel."""
 
 _SLOPES = tuple(f"{name}_ref" for name in VELOCITY)
 _ERRORS = tuple(f"e{axis}" for axis in POSITION)
@@ -113,7 +110,7 @@ _OF_REFERENCES = [_NAMES.index(name) for name in _SLOPES]
 
 
 class FigureSeries:
-    """Collects a flight for its figures, part by part, in some MB."""
+    """Collects a flight for its figures part by part."""
 
     def __init__(self, plan: FlightPlan, parts: Iterable[Samples] = ()) -> None:
         self._rotors = plan.plant_vehicle.rotors
@@ -141,7 +138,7 @@ class FigureSeries:
         self._newest = rows[-2:].copy()
 
     def over_time(self) -> Series:
-        """Return the flight's columns, angles in degrees, and derived series.
+        """Return columns, angles in degrees, and derived series.
 
         Velocities are ENU, m/s; `ex` to `ez` are errors, m, `distance` their norm, and `rms` its RMS once settled.
         """
@@ -169,7 +166,7 @@ def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
 
 
 def _rows(part: Samples) -> Array:
-    """Return the series of a part as in `_NAMES`, then more rotors; nan as slopes of the reference."""
+    """Return a part's series as in `_NAMES`, then more rotors; the slopes are nan."""
     position, reference = part.columns(POSITION), part.columns(POSITION_REFERENCE)
     columns = [
         part.table[:, : len(COLUMNS)],
@@ -186,7 +183,7 @@ def _rows(part: Samples) -> Array:
 
 @compiled
 def _earth_velocity(attitudes: Array, velocities: Array) -> Array:
-    """Return velocities ENU of Euler angles (n, 3) and velocities FLU (n, 3)."""
+    """Turn velocities FLU (n, 3) to ENU by Euler angles (n, 3)."""
     turned = np.empty_like(velocities)
     for i in range(len(turned)):
         R = rotation_matrix(quaternion_from_euler(attitudes[i, 0], attitudes[i, 1], attitudes[i, 2]))

@@ -1,4 +1,4 @@
-"""Arrays for judging a flight, some 50 bytes for each control sample."""
+"""Arrays for judging a flight."""
 
 from collections.abc import Callable
 
@@ -11,20 +11,20 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _ABOVE_GROUND_M = 0.1
-"""Below a higher reference the vehicle must not touch the ground."""
+"""Below a higher reference the ground must not be touched."""
 _WINDOW_S = 1.0
 _GRAVITY_M_S2 = 9.81
 
 
 class FlightSeries:
-    """A flight of n control samples and the m = n - 1 decisions between them, as in a `Recording`.
+    """A flight of n control samples and m = n - 1 decisions, as in a `Recording`.
 
     Attributes:
         moment_n_m: Norm of U2, U3 and U4, (n,).
         upright: Cosine of the tilt, (n,).
-        contact_speed_m_s: Speed at each sample before a contact with the ground.
-        swings_rad_s: Swing of the thrust axis in each second, by its end: the RMS of its rate of turn that the track
-            does not explain, never above that of the rate itself.
+        contact_speed_m_s: Speed before each contact with the ground.
+        swings_rad_s: Swing of the thrust axis in each second, by its end: the RMS of the rate of turn that the track
+            does not explain, at most that of the rate.
         touches, aloft: Masks of samples on the ground, and with the reference above it, (n,).
     """
 

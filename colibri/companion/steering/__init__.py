@@ -1,1 +1,1 @@
-"""From a state to a setpoint: predict the state, run the law, convert its moments to body rates."""
+"""From a state to a setpoint."""

@@ -1,8 +1,8 @@
 """Fly a control law on a vehicle whose rotors it cannot command (docs/companion.md).
 
-Virtual rotors, those of the vehicle file, follow the law's rotor speeds and turn the modelled vehicle for one interval;
-the inverse of the stack's response gives roll and pitch rates that lead there. Stacks differ too much in yaw: the law's
-references turn with the vehicle, and a separate loop commands the yaw rate.
+The vehicle file's rotors follow the law's speeds and turn the modelled vehicle for one interval; the inverse of the
+stack's response gives the roll and pitch rates. Stacks differ too much in yaw: the law's references turn with the
+vehicle, and a separate loop commands the yaw rate.
 """
 
 from math import cos, dist, hypot, sin
@@ -40,7 +40,7 @@ APPROACH = Limits(
 )
 """Limits on the way to the track."""
 _MAX_INTERVAL_US = 10_000
-"""Setpoints are sent at 100 Hz or more, even for a slower law."""
+"""Setpoints are sent at 100 Hz or more."""
 _THERE_M, _THERE_M_S = 0.002, 0.005
 _YAW_1_S = 2.0
 """Gain of the heading error."""
@@ -49,7 +49,7 @@ _NO_DISTURBANCE = np.zeros(6)
 
 
 class ApproachTask(GoToTask):
-    """To the first point of the track, until the reference itself stands there."""
+    """To the first point of the track, until the reference stands there."""
 
     def arrived(self, context: TaskContext) -> bool:
         there = dist(context.place, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
@@ -57,7 +57,7 @@ class ApproachTask(GoToTask):
 
 
 class LawDemand(NamedTuple):
-    """Demand of a law; fields of a decision are `None` between two of them, `track_s` is negative before the track."""
+    """Demand of a law; decisions are `None` between two of them, `track_s` is negative before the track."""
 
     rate_flu_rad_s: Vector
     thrust_n: float
@@ -109,7 +109,7 @@ class LawPilot:
         self._lags = max(response.acceleration_lag_s[:2]) > 0.0
 
     def begin(self, y: Array) -> None:
-        """Take over a vehicle that moves as `y` (17,): brake, and stay."""
+        """Brake from state `y`, (17,), and stay."""
         frame = _frame(0, y)
         self._tick = 0
         self._loop.begin(self._vehicle.hover_speed, self._loop.observe(frame).euler[2])
@@ -118,7 +118,7 @@ class LawPilot:
         self._task = HoldTask()
 
     def fly_track(self, stay: Stay | None = None) -> None:
-        """Go to the track from the present reference, and along it, or stay there."""
+        """Go to the track and along it, or stay."""
         reference = self._generator.reference
         if stay is not None and reference is not None:
             self._track = stay.track(first(reference.motion), float(reference.heading[0]))
@@ -147,7 +147,7 @@ class LawPilot:
         return self._tick * self.interval_us
 
     def step(self, y: Array) -> LawDemand:
-        """Return the demand for a vehicle in state `y` at the time of effect; call it once an interval."""
+        """Return the demand for state `y` at the time of effect, once an interval."""
         decision, horizon, place = None, None, None
         time_us = self._time_us
         if self._tick % self._parts == 0:
@@ -218,10 +218,7 @@ class LawPilot:
 
 
 def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
-    """Limit a vehicle's acceleration to that of its stack by larger moments of inertia.
-
-    Without this model a law would demand an unreachable acceleration, and overshoot.
-    """
+    """Limit the acceleration to that of the stack by larger moments of inertia, else a law would overshoot."""
     _, *moments_n_m = vehicle.max_wrench().tolist()
     most = response.max_acceleration_rad_s2
     ix, iy = (

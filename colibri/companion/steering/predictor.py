@@ -1,4 +1,4 @@
-"""Predict the state at a command's time of effect from the last state and the commands sent since.
+"""Predict the state at a command's time of effect from the last state and the commands since.
 
 The error of a prediction is a disturbance. Its lasting part along the thrust refines the thrust scale; a lasting error
 of position is a drift of the estimate.
@@ -23,20 +23,18 @@ _FOLLOWS_US = 150_000
 """A longer gap resets the disturbances."""
 _KEPT_US = 1_000_000
 _DRIFT_1_S = 8.0
-"""Adaptation of the drift: PX4 spreads each GPS correction over a quarter of a second."""
+"""PX4 spreads each GPS correction over a quarter of a second."""
 _MAX_DRIFT_M_S = 1.0
 _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
 _TURN_PART = 0.5
-"""Part of the rate error that counts as disturbance: the rate model is less certain."""
+"""Part of the rate error that counts as disturbance."""
 _TURN_POWER = 8.0
-"""The later the rates follow, the more of their error is the model's, not a disturbance."""
+"""The later the rates follow, the more of their error is the model's."""
 _CORRECTED_IN_LATENESSES = 8.0
-"""Correction time of predicted rates, in latenesses. Of the rest the vehicle's estimate is better than the model."""
+"""Correction time of predicted rates, in latenesses."""
 _CORRECTED_IN_LAGS = 2.0
-"""Correction time of predicted rates of second order, in acceleration lags: measured rates are noisier than the
-model is wrong.
-"""
+"""Correction time at second order, in acceleration lags: measured rates are noisier than the model is wrong."""
 _TURN_PART_OF_LAGGING = 0.05
 """`_TURN_PART` of a response of second order."""
 _SCALE_1_S = 0.25
@@ -54,10 +52,9 @@ class Predictor:
     """Predicts one vehicle.
 
     Attributes:
-        corrected_in_s: Time constant of corrections. It must grow with the delay: an immediate correction of errors by
-            jitter and loss would look like motion.
+        corrected_in_s: Time constant of corrections. Grows with the delay, else jitter and loss look like motion.
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
-        drift_m_s: Velocity of the estimated position minus estimated velocity, ENU, as by GPS corrections.
+        drift_m_s: Velocity of the estimated position minus estimated velocity, ENU.
     """
 
     def __init__(self, vehicle: Vehicle, response: Response) -> None:
@@ -91,7 +88,7 @@ class Predictor:
             self._sent.popleft()
 
     def observe(self, at_us: int, state: TimedState) -> None:
-        """Use the state of a time; states out of order are dropped."""
+        """Use a state; one out of order is dropped."""
         if self._known is not None and at_us <= self._known[0]:
             return
         lift = self._acting(at_us)[0].values[3]

@@ -1,8 +1,8 @@
-"""Tracks as a companion flies them, and recent references.
+"""Tracks and steps of an identification as a companion flies them, and recent references.
 
-A track's time starts smoothly, as a standing vehicle cannot follow a track that begins at speed: its rate rises from 0
-to 1 by a polynomial whose first four derivatives vanish at both ends. What the track hover leaves out is the vehicle's
-own. The error of an estimate that arrives late needs the reference of that time.
+A standing vehicle cannot follow a track that begins at speed: the track's time starts by a polynomial whose rate rises
+from 0 to 1 and whose first four derivatives vanish at both ends. An estimate that arrives late is compared with the
+reference of its time.
 """
 
 from bisect import bisect_right
@@ -15,10 +15,11 @@ import numpy as np
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.autopilot.guidance.trajectories.tracks import Hover, Place, Track
 from colibri.common.types import Vector
+from colibri.mavlink.client.states import TimedState
 
 OVER_S = 4.0
 _SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)
-"""Coefficients of u^5 to u^9: rises from 0 to 1 over u = 0..1."""
+"""Coefficients of u^5 to u^9, over u = 0..1."""
 _FIRST_POWER = 5
 
 
@@ -55,7 +56,7 @@ def _warped(t: TaylorSeries, over_s: float) -> TaylorSeries:
 
 
 class Stay(NamedTuple):
-    """A place, m, ENU, and a heading; `None` for the vehicle's own."""
+    """A place, m, ENU, and a heading; `None` for the vehicle's."""
 
     x: float | None = None
     y: float | None = None
@@ -74,7 +75,7 @@ class Stay(NamedTuple):
 
 
 def stay_of(name: str) -> Stay | None:
-    """Return the place of a valid `hover` track; `None` for other tracks."""
+    """Return the place of a valid `hover` track, else `None`."""
     base, _, options = name.partition(":")
     if base != "hover":
         return None
@@ -86,7 +87,7 @@ _KEPT = 256
 
 
 class PastReference(NamedTuple):
-    """A reference with its time; `track_enu_m` is `None` on the way to the track."""
+    """A reference; `track_enu_m` is `None` before the track."""
 
     at_us: int
     position_enu_m: Vector
@@ -122,3 +123,66 @@ class ReferenceHistory:
 def _between(first: Vector, second: Vector, part: float) -> Vector:
     x, y, z = (a + part * (b - a) for a, b in zip(first, second, strict=True))
     return (x, y, z)
+
+
+ROUNDS = 3
+PAUSE_S = 1.2
+"""Rest between two doublets."""
+
+
+class Doublet(NamedTuple):
+    """A rate added about an axis (0..2), then its opposite, for `half_s` each."""
+
+    axis: int
+    rate_rad_s: float
+    half_s: float
+
+
+DOUBLETS = (Doublet(0, 0.4, 0.2), Doublet(1, 0.4, 0.2), Doublet(2, 0.4, 0.4))
+_NOTHING: Vector = (0.0, 0.0, 0.0)
+
+
+def duration_s() -> float:
+    return ROUNDS * sum(PAUSE_S + 2.0 * doublet.half_s for doublet in DOUBLETS)
+
+
+def step_at(time_s: float) -> Vector:
+    left_s = time_s % (duration_s() / ROUNDS)
+    for doublet in DOUBLETS:
+        left_s -= PAUSE_S
+        if left_s < 0.0:
+            return _NOTHING
+        if left_s < 2.0 * doublet.half_s:
+            rate = doublet.rate_rad_s if left_s < doublet.half_s else -doublet.rate_rad_s
+            p, q, r = (rate if axis == doublet.axis else 0.0 for axis in range(3))
+            return (p, q, r)
+        left_s -= 2.0 * doublet.half_s
+    return _NOTHING
+
+
+class StepFlight:
+    """Adds the steps to body rates; rows of `commanded` and `measured` are time, s, p, q, r, rad/s."""
+
+    def __init__(self) -> None:
+        self.commanded: list[tuple[float, float, float, float]] = []
+        self.measured: list[tuple[float, float, float, float]] = []
+        self._began_us: int | None = None
+
+    def begin(self, at_us: int) -> None:
+        self._began_us = at_us
+
+    def is_over(self, now_us: int) -> bool:
+        return self._began_us is not None and (now_us - self._began_us) * 1e-6 >= duration_s()
+
+    def rates(self, rate_flu_rad_s: Vector, now_us: int, arrives_us: int) -> Vector:
+        """Return the rates to command now, which arrive at `arrives_us`."""
+        if self._began_us is None:
+            return rate_flu_rad_s
+        step = step_at((now_us - self._began_us) * 1e-6)
+        p, q, r = (a + b for a, b in zip(rate_flu_rad_s, step, strict=True))
+        self.commanded.append((arrives_us * 1e-6, p, q, r))
+        return p, q, r
+
+    def add(self, at_us: int, state: TimedState) -> None:
+        if self._began_us is not None:
+            self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))

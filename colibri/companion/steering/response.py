@@ -1,7 +1,7 @@
 """Model of a vehicle under a stack's rate loop, and a law slowed down for it.
 
-With commanded rates c and time constant T, w' = (c - w) / T is a lag of first order. If the acceleration lags by L, w'
-= a, a' = ((c - w) / T - a) / L is one of second. A law would take the errors of a late model for motion, and swing.
+With commanded rates c and time constant T, w' = (c - w) / T is a lag of first order. With a lag L of the acceleration,
+w' = a, a' = ((c - w) / T - a) / L is one of second.
 """
 
 from math import ceil, sqrt
@@ -27,7 +27,7 @@ _ROUNDING = 1e-6
 
 
 class ResponseModel(NamedTuple):
-    """Numbers of the model along p, q, r or FLU; a lag of 0 is immediate, drag is over mass."""
+    """Numbers of the model along p, q, r or FLU; drag is over mass."""
 
     time_constant_s: Array
     max_acceleration_rad_s2: Array
@@ -48,7 +48,7 @@ def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
 
 
 def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
-    """Return the rate commands that lead to `next_rate` in an interval: the exact inverse, without acceleration lag."""
+    """Return the rate commands that lead to `next_rate` in an interval, by the inverse without acceleration lag."""
     p, q, r = (
         _rate_command(now, then, interval_s, *of)
         for now, then, *of in zip(
@@ -80,7 +80,7 @@ def _rate_command(
 
 @compiled
 def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, packed: Packed) -> Array:
-    """Propagate y, (17,), through successive commands of `durations_s`, (n,).
+    """Propagate y, (17,), through commands of `durations_s`, (n,).
 
     Args:
         y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s²; rate acceleration,
@@ -157,23 +157,20 @@ def _push(y: Array, lift: float, disturbance: Array, drag: Array, gravity_m_s2: 
 
 
 _AS_TUNED_S = 0.06
-"""Largest delay, dead time and lag together, of a law as tuned."""
+"""Largest delay of a law as tuned."""
 _MOST = 1.6
 _WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
-"""Power of the slowness in each weight: less demand on position, more cost of each change."""
+"""Power of the slowness in each weight."""
 
 
 def delay_s(response: Response) -> float:
-    """Return the delay of roll and pitch rates, dead time and lag together, s.
-
-    For second order this is the acceleration's lag: the inverse of the response undoes the rate loop.
-    """
+    """Return dead time and lag of roll and pitch rates, s; at second order the inverse undoes the rate loop."""
     pairs = zip(response.time_constant_s[:2], response.acceleration_lag_s[:2], strict=True)
     return response.latency_s + max(behind_s or lag_s for lag_s, behind_s in pairs)
 
 
 def slowness(response: Response) -> float:
-    """Return the factor of slowing; 1 for a vehicle that is quick enough."""
+    """Return the factor of slowing, 1 or more."""
     return min(max(delay_s(response) / _AS_TUNED_S, 1.0), _MOST)
 
 
@@ -183,7 +180,7 @@ def lateness_s(response: Response) -> float:
 
 
 def slowed(profile: Profile, response: Response) -> Profile:
-    """Slow the law down for a response; laws with other weights are unchanged."""
+    """Slow a law down; laws with other weights are unchanged."""
     times = slowness(response)
     weights: Any = profile.table(profile.controller).get("weights")
     if times == 1.0 or not isinstance(weights, dict) or not _WEIGHTS.keys() <= weights.keys():

@@ -1,1 +1,1 @@
-"""Supervision: checks before a flight, limits in flight, and the table of phases."""
+"""Checks before a flight, limits in flight, and phases."""

@@ -1,7 +1,4 @@
-"""Consistency of reported motion, and the rate of the setpoints.
-
-Values that are stale contradict each other. Track time counts setpoints, so late ones delay the track.
-"""
+"""Consistency of reported motion, as stale values contradict each other, and the rate of the setpoints."""
 
 from collections import deque
 from math import acos, dist
@@ -17,7 +14,7 @@ MAX_GAP_S, MAX_JUMP_GAP_S = 0.1, 1.0
 MAX_TURN_RAD, MAX_WAY_M = 0.15, 0.15
 """Largest contradiction in a window: 1 rad/s, 1 m/s."""
 _WINDOWS = 2
-"""A correction of the estimate contradicts once, stale values in each window."""
+"""A correction of the estimate contradicts once, stale values again and again."""
 
 
 class _Start(NamedTuple):
@@ -29,8 +26,8 @@ class Consistency:
     """Integrates body rates and velocity over windows.
 
     Attributes:
-        contradiction: In words; empty without one.
-        jumped_m: Largest jump of the position, m, until its reader clears it.
+        contradiction: In words, or empty.
+        jumped_m: Largest jump of the position, until its reader clears it.
     """
 
     def __init__(self) -> None:
@@ -117,7 +114,7 @@ class SetpointRate:
         return (now_us - last_us) * 1e-6
 
     def kept(self, now_us: int, interval_us: int) -> float:
-        """Return the computed part of the last second's setpoints; 1 in the first second."""
+        """Return the part of the last second's setpoints that was computed, 1 at first."""
         if now_us - self._began_us < _WINDOW_US:
             return 1.0
         there = sum(1 for at_us in self._sent_us if at_us > now_us - _WINDOW_US)

@@ -1,7 +1,4 @@
-"""Phases of a companion: one table, a pure function over it, and the conditions of a situation.
-
-The first row whose condition holds applies.
-"""
+"""Phases of a companion: a table whose first row that holds applies, and its conditions."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -24,7 +21,7 @@ class CompanionPhase(StrEnum):
 
 
 class PhaseCondition(StrEnum):
-    """Condition of a transition; its value is the message to the user."""
+    """Condition of a transition, as the user reads it."""
 
     CONNECTED = "the vehicle is known"
     STOPPED = "stopped"
@@ -92,7 +89,7 @@ WITHIN_S: dict[CompanionPhase, float] = {
 
 
 class Situation(NamedTuple):
-    """Inputs of the conditions; `modes` are of the companion's making, `mode` is -1 before the first report."""
+    """Inputs of the conditions; the companion caused `modes`, `mode` is -1 before the first report."""
 
     phase: CompanionPhase
     stack: Stack | None
@@ -138,7 +135,7 @@ def conditions(now: Situation) -> frozenset[PhaseCondition]:
 
 
 class CompanionEnd(NamedTuple):
-    """How it ended; `in_order` if the flight was completed, or ended by someone entitled to."""
+    """How it ended; `in_order` if it was completed or ended by the pilot."""
 
     in_order: bool
     why: str
@@ -147,7 +144,7 @@ class CompanionEnd(NamedTuple):
 def how_it_ended(
     before: CompanionPhase, why: PhaseCondition, limit: Rule[FlightFacts] | None, fault: str, waits_for: Sequence[str]
 ) -> CompanionEnd:
-    """Judge an ending; `fault` is a refusal, an emergency or an error, `waits_for` what was missing on the ground."""
+    """Judge an ending; `fault` is a refusal or an error, `waits_for` what was missing on the ground."""
     if limit is not None:
         return CompanionEnd(False, f"ended by its limit: {limit.name}")
     if fault:

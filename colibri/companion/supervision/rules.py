@@ -1,4 +1,4 @@
-"""Rules of a companion: checks before it arms or takes over, and limits that end its flight, over one kind of facts."""
+"""Checks before a companion arms or takes over, and limits that end its flight."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -25,10 +25,7 @@ CRITICAL = frozenset({5, 6, 7, 8})
 
 
 class Age(NamedTuple):
-    """A row of the table: a report, its messages, and its largest age at the start and in flight, s.
-
-    A vehicle that never sends a `needed` one is not flown.
-    """
+    """A report, its messages, and its largest age, s; without a `needed` one nothing is flown."""
 
     name: str
     messages: str
@@ -51,13 +48,13 @@ AGES: tuple[Age, ...] = (
 
 
 def ages_s(report: VehicleReport, answered_us: int | None, now_us: int) -> dict[str, float]:
-    """Return the age of each report that the vehicle has sent; `answered_us` is of the last TIMESYNC."""
+    """Return the age of each report; `answered_us` is of the last TIMESYNC."""
     reported = report.reported_us if answered_us is None else {**report.reported_us, "clock": answered_us}
     return {name: (now_us - at_us) * 1e-6 for name, at_us in reported.items()}
 
 
 def too_old(ages: Mapping[str, float], *, in_flight: bool) -> list[str]:
-    """Say which reports are too old. One that was never sent is not: see `missing` and `needed`."""
+    """Say which reports are too old; `missing` names those never sent."""
     limits = ((row, row.flight_s if in_flight else row.start_s) for row in AGES)
     return [
         f"the last {row.name} report ({row.messages}) is {ages[row.name]:.1f} s old, more than {limit_s:g}"
@@ -102,7 +99,7 @@ def box_of(track: Track, duration_s: float, margin_m: float) -> FlightRegion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLimits:
-    """Limits of a flight, each an option of the command line."""
+    """Limits of a flight, each an option."""
 
     margin_m: float = 3.0
     max_tilt_deg: float = 50.0
@@ -115,12 +112,7 @@ class FlightLimits:
 
 @dataclass(frozen=True, slots=True)
 class FlightFacts:
-    """Facts of a flight.
-
-    Attributes:
-        jumped_m: Jump of the estimate at the newest state.
-        pace: Computed part of the last second's setpoints.
-    """
+    """Facts of a flight; `jumped_m` is the estimate's newest jump, `pace` the computed part of the last setpoints."""
 
     report: VehicleReport
     state_age_s: float = 0.0
@@ -159,7 +151,7 @@ class CheckFacts(FlightFacts):
 
     @property
     def wrong_parameters(self) -> list[str]:
-        """Say which parameters are wrong, and which needed ones were not answered: their defaults are not assumed."""
+        """Say which parameters are wrong, and which needed ones were not answered."""
         values = self.parameters
         if values is None:
             return []
@@ -186,8 +178,8 @@ class Rule(NamedTuple, Generic[F]):
 
     Attributes:
         words: What is wrong; of a check with advice.
-        required: Whether a check that is broken prevents the flight; otherwise it is only reported.
-        blind: Whether after a limit only the mode may be commanded.
+        required: Whether a broken check prevents the flight.
+        blind: Whether only the mode may be commanded after a limit.
     """
 
     name: str

@@ -8,8 +8,7 @@ import viser
 
 from colibri.common.types import Vector
 from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
-from colibri.view.page.commands import CommandPanels
-from colibri.view.page.controls import ControlPanel, Done, words
+from colibri.view.page.controls import CommandPanels, ControlPanel, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
 from colibri.view.page.server import PageServer, Token, address, stop
@@ -17,11 +16,11 @@ from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
 _LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
-"""Half size of the view before a live vehicle's path is known; margin around its plans."""
+"""Half size of the view before a live path is known; margin around its plans."""
 
 
 class Page:
-    """A page that shows vehicles; `laid_out` once a browser's panels have changed its camera's aspect."""
+    """Shows vehicles; `laid_out` once a browser's panels have changed its aspect."""
 
     def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
         self._sources = sources
@@ -81,7 +80,7 @@ class Page:
         client.camera.on_update(note)
 
     def done(self) -> Iterator[Done]:
-        """Yield user actions; those about the picture only are applied here."""
+        """Yield user actions; those about the picture are applied here."""
         while True:
             try:
                 done = self.controls.done.get_nowait()
@@ -127,7 +126,7 @@ class Page:
         CommandPanels(self.server, token, modes, self.controls.done, point)
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
-        """Return an animation of the scene, which works without a server."""
+        """Return an animation that needs no server."""
         self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]

@@ -19,11 +19,11 @@ _NOW = "#d01080"
 _AXIS_PX = 44
 _MARK = "mark"
 _UNSEEN = -1e4
-"""So far below the scale of 0 to 1 that what is seen of the way up is a vertical line."""
+"""So far below the scale that the line to it is vertical."""
 
 
 class Plots:
-    """One plot per title: all series of one vehicle, or the headline of each of several."""
+    """One plot per title: all series of one vehicle, or the headline of each."""
 
     def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str], *, marked: bool) -> None:
         self._marked = marked
@@ -97,7 +97,7 @@ class Plots:
 
 
 def _spike(times_s: Array, time_s: float) -> Array:
-    """Return a line from far below its scale, where it is not drawn, to the top at a time. uPlot cannot scale nan."""
+    """Return a line from far below to the top at a time; uPlot cannot scale nan."""
     mark = np.full(len(times_s), _UNSEEN)
     if time_s >= times_s[0]:
         mark[min(int(np.searchsorted(times_s, time_s)), len(times_s) - 1)] = 1.0

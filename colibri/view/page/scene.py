@@ -32,13 +32,13 @@ RALLY: Colour = (110, 60, 190)
 _FRONT: Colour = (220, 50, 40)
 _DARK: Colour = (60, 60, 65)
 _WIND_S = 0.4
-"""Length of the wind's arrow in time, for a vehicle of true size."""
+"""Length of the wind's arrow in time, at true size."""
 _ABOVE, _BELOW = (0.0, 0.0, 0.2), (0.0, 0.0, -0.2)
 _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 
 
 class VehicleScene:
-    """One vehicle with trail, reference and horizon, at `scale` times its size."""
+    """One vehicle with its lines, at `scale` times its size."""
 
     def __init__(self, scene: viser.SceneApi, number: int, airframe: VehicleShape, scale: float) -> None:
         self._scene = scene

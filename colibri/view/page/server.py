@@ -1,7 +1,6 @@
 """The server of the page: viser on loopback, with access control and a Content-Security-Policy.
 
-Pages of other sites can open connections to loopback, with their address in `Origin`. A foreign name that resolves to
-loopback (DNS rebinding) shows in `Host`.
+Pages of other sites show in `Origin`, and foreign names that resolve to loopback (DNS rebinding) in `Host`.
 """
 
 import secrets
@@ -51,7 +50,7 @@ def refusal(headers: Mapping[str, str], port: int) -> str | None:
 
 
 def content_policy(port: int, nonce: str) -> dict[str, str]:
-    """Return headers by which a browser runs the page's own scripts only, and connects to this server only."""
+    """Return headers that restrict a browser to the page's own scripts and this server."""
     sources = {
         "default-src": "'none'",
         "script-src": f"'nonce-{nonce}' 'wasm-unsafe-eval'",
@@ -100,7 +99,7 @@ def address(server: PageServer) -> str:
 
 
 def stop(server: PageServer) -> None:
-    """Stop a server; viser's message would mix with the page's address."""
+    """Stop a server without viser's message."""
     with redirect_stdout(StringIO()):
         server.stop()
 
@@ -140,6 +139,6 @@ def _looks_first(answer: _Answer) -> _Answer:
 
 
 def _with_nonce(page: bytes, nonce: bytes) -> bytes:
-    """Mark viser's loader, and the script that it unpacks and starts, as the page's own."""
+    """Mark viser's loader and the script that it unpacks as the page's own."""
     page = page.replace(b"<script ", b'<script nonce="%s" ' % nonce)
     return page.replace(b'createElement("script");', b'createElement("script");e.nonce="%s";' % nonce)

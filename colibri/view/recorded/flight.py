@@ -24,7 +24,7 @@ from colibri.view.recorded.horizons import Horizons
 from colibri.view.snapshot import NO_POINTS, NOWHERE, Chart, Snapshot, Surroundings, VehicleShape, ViewError
 
 MAX_ROWS = 30_000
-"""Rows in memory: ten minutes at 50 Hz; longer flights have a lower rate."""
+"""Rows in memory: ten minutes at 50 Hz."""
 CHART_POINTS = 512
 _ROW_S = 0.02
 _TRAIL_S = 8.0

@@ -1,6 +1,6 @@
-"""Predicted horizons of a recorded flight, by replay in a process of its own.
+"""Predicted horizons of a recorded flight, by replay in another process.
 
-`python -m colibri.view.recorded.horizons DIR` prints a line per horizon, its time and the coordinates of its points.
+`python -m colibri.view.recorded.horizons DIR` prints time and coordinates of each.
 """
 
 import os
@@ -17,7 +17,7 @@ from colibri.common.types import Array
 from colibri.view.snapshot import NO_POINTS
 
 _STALE_S = 0.3
-"""Age from which a horizon is hidden: the QP was not solved since."""
+"""Age from which a horizon is hidden."""
 _NICE = 15
 """Page and browser have priority."""
 
@@ -34,14 +34,14 @@ class Horizons:
         times_s.append(time_s)  # last: who looks it up from another thread finds its points
 
     def at(self, time_s: float) -> Array:
-        """Return the latest at a time, (k, 3); may be empty."""
+        """Return the latest at a time, (k, 3), if any."""
         times_s, horizons = self._known
         row = bisect_right(times_s, time_s + 1e-9) - 1
         return horizons[row] if row >= 0 and time_s - times_s[row] <= _STALE_S else NO_POINTS
 
 
 class HorizonProcess:
-    """The process that predicts the horizons, and the thread that reads them."""
+    """The process that predicts, and the thread that reads."""
 
     def __init__(self, folder: Path, horizons: Horizons) -> None:
         command = [sys.executable, "-m", "colibri.view.recorded.horizons", str(folder)]

@@ -16,7 +16,7 @@ EVERY = 5
 
 
 def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
-    """Yield time and points of each horizon, (k, 3), starting at the estimated position."""
+    """Yield time and points of each horizon, (k, 3), from the estimate on."""
     plan = plan_of(folder)
     loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
     forecaster = Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)

@@ -13,8 +13,7 @@ from colibri.companion.response_file import read_response, response_text
 from colibri.companion.stack import PX4, Response
 from colibri.companion.steering import response as model
 from colibri.companion.steering.law_pilot import turning_no_faster
-from colibri.companion.steering.references import OVER_S, smoothly_started
-from colibri.companion.steps import duration_s, step_at
+from colibri.companion.steering.references import OVER_S, duration_s, smoothly_started, step_at
 from colibri.plant.vehicle.description import load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird")

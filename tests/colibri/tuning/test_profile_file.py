@@ -4,7 +4,7 @@ import pytest
 
 import colibri
 from colibri.autopilot.control.profile import profile_names, profile_text
-from colibri.tuning.profile_file import profile_file, tuned_name
+from colibri.tuning.results import profile_file, tuned_name
 from tests.support.tuning import POSITION, WEIGHTS
 
 BLOCK = "profile.controllers.lpv-mpc.plan.blocks.0"

@@ -5,7 +5,7 @@ The long version is `python -m tools.fuzz`.
 
 import pytest
 
-from tools.fuzz.ground import ground_campaign
+from tools.fuzz.vehicle import ground_campaign
 
 
 @pytest.mark.parametrize(("count", "seed"), [(8_400, 1), pytest.param(25_000, 2, marks=pytest.mark.long)])

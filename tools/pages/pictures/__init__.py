@@ -1,1 +1,1 @@
-"""Pictures of docs/ that stand alone: a flight that moves, and the page of `colibri view`."""
+"""Pictures of docs/: a moving flight, and `colibri view`."""

@@ -19,13 +19,13 @@ FLAGS = (
 )
 SIZE = (1280, 800)
 WITHIN_MS = 60_000
-"""How long anything may take: without a GPU, on a computer that does other things too, seconds a picture."""
+"""Without a GPU a picture takes seconds."""
 _KNOWN_WARNINGS = ("THREE.Clock", "Evaluating a string as JavaScript")
-"""The second: viser's sorter of Gaussian splats, of which the page has none, is refused to compile text."""
+"""The second: viser's sorter of Gaussian splats is refused."""
 
 
 class Tab:
-    """A browser tab; `complaints` collects errors and requests to other computers."""
+    """A tab; `complaints` are errors and requests to other computers."""
 
     def __init__(self, page: Page, url: str) -> None:
         self.page = page

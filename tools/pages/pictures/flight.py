@@ -68,7 +68,7 @@ def _set_the_scene(axes: Any, table: SampleTable) -> None:
 
 
 def _lines_at(table: SampleTable, first: int, last: int) -> list[Array]:
-    """Return shadow, trail, thrust and both arms, each as points in ENU, (n, 3), m."""
+    """Return shadow, trail, thrust and both arms, ENU, (n, 3), m."""
     trail = np.column_stack([table[axis][first : last + 1] for axis in "xyz"])
     row = table[last]
     turn = np.array(rotation_matrix(quaternion_from_euler(row["phi"], row["theta"], row["psi"])))

@@ -1,4 +1,4 @@
-"""`view-*.png`: the page of `colibri view` in Chromium, of flights live and recorded."""
+"""`view-*.png`: the page of `colibri view` in Chromium."""
 
 import subprocess
 import sys
@@ -32,7 +32,7 @@ from tools.pages.pictures.watched import Watched
 
 FRAME_S, PLOTTED_AGAIN = 0.1, 8
 DRAWN_AFTER_MS = 15000
-"""Without a GPU a picture takes a second, and the last data must be in it."""
+"""Without a GPU a picture takes seconds."""
 COLOURS = 160
 KNOWN_AFTER_S, ON_ITS_WAY_S, PATIENCE_S, NEAR_M = 10.0, 3.0, 60.0, 0.5
 PLACES_M = ((0.0, 0.0, 4.0), (8.0, 0.0, 4.0), (8.0, 6.0, 5.0), (0.0, 6.0, 5.0))
@@ -143,7 +143,7 @@ def wait(until: Callable[[], object]) -> None:
 
 
 def keep(path: Path, sources: Sequence[Source], time_s: float | Callable[[], float], *, commands: bool = False) -> None:
-    """Write a picture of the page at a time, evaluated once the browser is open."""
+    """Write a picture at a time, evaluated once the browser is open."""
     page = Page(sources, serve(0, "Colibri"))
     if commands:
         page.offer_commands(TOKEN, lambda: CHOICES[PX4])

@@ -1,4 +1,4 @@
-"""A flight in simulated time as a live vehicle of `colibri view`."""
+"""A simulated flight as a live vehicle of `colibri view`."""
 
 from colibri.mavlink.wire.dialect import Message
 from colibri.sitl.ground_station import Station

@@ -23,7 +23,7 @@ class _Listener(HelpFormatter):
 
 
 def arguments_of(parser: ArgumentParser) -> list[Action]:
-    """Return the arguments of a parser in the order of its help."""
+    """Return arguments in the order of the help."""
     listener = _Listener(parser.prog)
     parser.formatter_class = lambda prog: listener  # noqa: ARG005
     parser.format_help()
@@ -61,7 +61,7 @@ def _split(row: str) -> tuple[str, str]:
 
 
 def _section(name: str, parser: ArgumentParser, told: dict[str, tuple[str, str]]) -> Iterator[str]:
-    """Yield the section of a command; `told` has the rows of those before it, with their commands and defaults."""
+    """Yield a section; `told` has earlier rows, with commands and defaults."""
     does = COMMANDS[name].does if name in COMMANDS else PROCESSES[name]
     yield f"## colibri {name}\n"
     yield f"{does[0].upper()}{does[1:]}.\n"

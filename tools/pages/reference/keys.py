@@ -43,7 +43,7 @@ def vehicles() -> Iterator[str]:
 
 
 def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[str, tuple[str, str, str]]:
-    """Return value, comment and file of each dotted key: of `first`, which is not named, or the first with it."""
+    """Return value, comment and file of each dotted key, first of `first`, which is not named."""
     found: dict[str, tuple[str, str, str]] = {}
     for name in sorted(names, key=lambda name: name != first):
         table = key = ""

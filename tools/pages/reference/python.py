@@ -77,7 +77,7 @@ def _options(kind: type) -> Iterator[str]:
 
 
 def _origins() -> dict[str, str]:
-    """Return the class that describes a member, by its row: the first on the page, or a base of that."""
+    """Return the class that describes a member, by its row: the first, or its base."""
     origins: dict[str, type] = {}
     for package in map(import_module, FACES):
         for name in sorted(package.__all__, key=str.lower):
@@ -99,7 +99,7 @@ def _members(kind: type, origins: dict[str, str]) -> Iterator[str]:
 
 
 def _rows(kind: type) -> Iterator[tuple[str, str]]:
-    """Yield names and lines of the public members with a docstring."""
+    """Yield names and lines of documented public members."""
     internal = _INTERNAL.get(kind.__name__, "").split()
     members = dict(inspect.getmembers(kind))
     assert members.keys() >= set(internal), f"{kind.__name__} lacks {set(internal) - members.keys()}"
@@ -119,7 +119,7 @@ def _rows(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _signature(name: str, function: Any) -> str:
-    """Return names and defaults of the arguments; types are in the docstrings where they matter."""
+    """Return names and defaults of the arguments."""
     parts, star = [], False
     for parameter in inspect.signature(function).parameters.values():
         if parameter.name == "self":
