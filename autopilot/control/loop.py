@@ -218,6 +218,7 @@ class ControlLoop:
 
     def _take_in(self, controller: Controller[Any]) -> None:
         self.controller = controller
+        self.tilts_freely = bool(getattr(controller, "tilts_freely", False))
         self._reads_motion = vars(type(controller)).get("reads_motion", True)  # not that of a base class
         lag = rotor_lag(self.vehicle, controller.control_interval_us * 1e-6)
         self._lag = (lag.up, lag.down)

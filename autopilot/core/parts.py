@@ -74,7 +74,8 @@ def parts_of(
     flown, assumed = numbers.applied(parameters.values)
     flies_by = behaviour(parameters)
     loop = ControlLoop(flown, assumed, clock)
-    attitude = AttitudeReference(assumed, loop.preview, attitude_limits(flies_by)) if loop.takes_attitude else None
+    limits = attitude_limits(flies_by, free=loop.tilts_freely)
+    attitude = AttitudeReference(assumed, loop.preview, limits) if loop.takes_attitude else None
     planned_at = instants(loop.preview, loop.control_interval_us)
     home, lines, budget = Home(settings.origin), StatusQueue(), Budget()
     fence = Fence(home, flies_by, budget)

@@ -4,7 +4,7 @@ Each angle is slewed with bounded rate and acceleration. The thrust direction is
 the reached yaw. Body rates are integrated by THESIS [2.7].
 """
 
-from math import isnan, nan, radians
+from math import cos, isnan, nan, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Attit
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.elementary import square
-from colibri.common.rotations import nearest_turn, rotation_matrix
+from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
 from colibri.plant.vehicle.description import Vehicle
@@ -41,12 +41,14 @@ class AttitudeLimits(NamedTuple):
 
 
 DEFAULT_LIMITS = AttitudeLimits()
+_FREE_SLEW = DEFAULT_LIMITS.slew._replace(free=True, tilt_rate_rad_s=8.0, tilt_acceleration_rad_s2=120.0)
 
 
-def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
-    tilt_rad, rate_rad_s, slew = radians(behaviour.max_tilt_deg), behaviour.stick_yaw_rate_rad_s, DEFAULT_LIMITS.slew
+def attitude_limits(behaviour: Behaviour, *, free: bool = False) -> AttitudeLimits:
+    """Return the limits of a vehicle's parameters, with a control law that flies in any attitude if `free`."""
+    slew, rate_rad_s = _FREE_SLEW if free else DEFAULT_LIMITS.slew, behaviour.stick_yaw_rate_rad_s
     slew = slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, rate_rad_s))
-    return DEFAULT_LIMITS._replace(stick_tilt_rad=tilt_rad, stick_yaw_rate_rad_s=rate_rad_s, slew=slew)
+    return AttitudeLimits(radians(behaviour.max_tilt_deg), rate_rad_s, DEFAULT_LIMITS.yaw_ahead_rad, slew)
 
 
 class ReferenceMemory(NamedTuple):
@@ -68,7 +70,7 @@ class AttitudeReference:
         self.step(self.initial(AT_REST), AT_REST, tilt_command(0.0, 0.0, 0.0, self.weight_n))
 
     def obey(self, behaviour: Behaviour) -> None:
-        self.limits = attitude_limits(behaviour)
+        self.limits = attitude_limits(behaviour, free=self.limits.slew.free)
 
     def adopt(self, vehicle: Vehicle) -> None:
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
@@ -85,7 +87,12 @@ class AttitudeReference:
         angles, rates = np.empty((self._samples + 1, 3)), np.empty((self._samples + 1, 3))
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
-        angles[0, 2] = self._near(memory.angles[2].item(), state.euler[2])
+        phi, theta, psi = memory.angles.tolist()
+        steep = cos(phi) * cos(theta) < cos(self.limits.slew.max_tilt_rad)
+        if steep and command.kind != ATTITUDE:
+            angles[0] = euler_from_quaternion(quaternion_from_euler(phi, theta, psi))
+        if not (steep and self.limits.slew.free):
+            angles[0, 2] = self._near(angles[0, 2].item(), state.euler[2])
         slew_on(command, self.weight_n, self.limits.slew, self._interval_s, angles, rates, thrusts)
         after = ReferenceMemory(angles[1].copy(), rates[1].copy(), thrusts[1].item())
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])

@@ -17,7 +17,7 @@ _NO_DIRECTION = 1e-9
 
 
 class Slew(NamedTuple):
-    """Limits of tilt, rates and accelerations; w as frequencies."""
+    """Limits of tilt, rates and accelerations; w as frequencies. Attitudes are not limited if `free`."""
 
     max_tilt_rad: float
     tilt_frequency_rad_s: float
@@ -27,6 +27,7 @@ class Slew(NamedTuple):
     yaw_rate_rad_s: float
     yaw_acceleration_rad_s2: float
     thrust_rate_n_s: float
+    free: bool = False
 
 
 class AttitudeCommand(NamedTuple):
@@ -52,6 +53,9 @@ def slew_on(
     """Fill angles phi, theta, psi and rates, (n, 3), and thrusts, N, (n,), starting from their first rows."""
     kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
+    free, over = slew.free and kind == ATTITUDE, False
+    if free:
+        over, yaw_rad = _nearest_way(vector, yaw_rad, angles[0], wanted)
     for n in range(angles.shape[0] - 1):
         here, there = angles[n], angles[n + 1]
         there[:] = here
@@ -60,7 +64,7 @@ def slew_on(
             _euler_rates(here, vector, wanted_rate)
         else:
             wanted_rate[2] = command.yaw_rate_rad_s
-        towards = here[2] if kind != ATTITUDE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
+        towards = here[2] if kind != ATTITUDE else _near(yaw_rad, here[2])
         w, max_rate, max_acceleration = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
         pull = w * w * (towards - here[2])
         _move(2, pull, wanted_rate[2], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
@@ -68,15 +72,23 @@ def slew_on(
             wanted[0], wanted[1] = vector[0], vector[1]
         elif kind == ATTITUDE:
             _point(vector, there[2], slew.max_tilt_rad, wanted)
+            if free:
+                _turn(vector, there[2], over, here, wanted)
             after = wanted[:2].copy()
             _point(vector, here[2], slew.max_tilt_rad, wanted)
+            if free:
+                _turn(vector, here[2], over, here, wanted)
             wanted_rate[:2] = (after - wanted[:2]) / interval_s
         w, max_rate, max_acceleration = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
         for i in range(2):
             pull = 0.0 if kind == RATE else w * w * (wanted[i] - here[i])
             _move(i, pull, wanted_rate[i], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
-        limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
-        thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(command.thrust_n) else command.thrust_n
+        if not free:
+            limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
+        up = cos(there[0]) * cos(there[1])
+        if free:
+            up = max(up, cos(slew.max_tilt_rad))
+        thrust = weight_n / up if isnan(command.thrust_n) else command.thrust_n
         maximum = slew.thrust_rate_n_s * interval_s
         thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -maximum), maximum)
 
@@ -122,6 +134,35 @@ def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) ->
     ahead = x * c + y * s
     angles[0] = atan2(x * s - y * c, sqrt(ahead * ahead + z * z))
     angles[1] = atan2(ahead, z)
+
+
+@compiled
+def _near(angle: float, other: float) -> float:
+    return angle - 2.0 * pi * floor((angle - other) / (2.0 * pi) + 0.5)
+
+
+@compiled
+def _turn(direction: Vector, psi: float, over: bool, here: Array, angles: Array) -> None:
+    """Write roll and pitch near `here` that point body z along any `direction`; `over`: with roll beyond 90 degrees."""
+    x, y, z = direction[0], direction[1], direction[2]
+    c, s = cos(psi), sin(psi)
+    ahead = x * c + y * s
+    phi, theta = atan2(x * s - y * c, sqrt(ahead * ahead + z * z)), atan2(ahead, z)
+    angles[0] = _near(pi - phi if over else phi, here[0])
+    angles[1] = _near(pi + theta if over else theta, here[1])
+
+
+@compiled
+def _nearest_way(direction: Vector, yaw_rad: float, here: Array, angles: Array) -> tuple[bool, float]:
+    """Choose how to reach an attitude, by roll or by pitch: whether roll is beyond 90 degrees, and yaw."""
+    over, best, found = False, 1e9, yaw_rad
+    for half in range(2):
+        beyond, yaw = (direction[2] < 0.0) != (half == 1), yaw_rad + half * pi
+        _turn(direction, yaw, beyond, here, angles)
+        way = abs(angles[0] - here[0]) + abs(angles[1] - here[1]) + abs(_near(yaw, here[2]) - here[2])
+        if way < best:
+            over, best, found = beyond, way, yaw
+    return over, found
 
 
 @compiled

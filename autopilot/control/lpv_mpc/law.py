@@ -112,6 +112,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         h = self._interval_s
         max_tilt_deg = settings.guidance.max_tilt_deg
         upright = max_tilt_deg < 90.0
+        self.tilts_freely = not upright
         self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock, upright=upright)
         self.min_path_speed = settings.path.min_speed
         samples = self._mpc.horizon + 2

@@ -1,4 +1,4 @@
-from math import acos, cos, degrees, nan, radians, sin
+from math import acos, cos, degrees, nan, pi, radians, sin
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,12 @@ from colibri.autopilot.guidance.attitude_reference import (
     AttitudeReference,
     ReferenceMemory,
     attitude_command,
+    attitude_limits,
     rate_command,
     tilt_command,
 )
 from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
+from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Quaternion
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
@@ -194,6 +196,32 @@ def test_setpoints_of_a_client() -> None:
     fed = REFERENCE.from_setpoint(AttitudeSetpoint(attitude, (9.0, 9.0, 0.4), nan))
     assert fed.yaw_rate_rad_s == 0.4
     assert np.isnan(fed.thrust_n)
+
+
+FREE = AttitudeReference(load_vehicle("hummingbird"), Preview(8_000, 22), attitude_limits(Behaviour(), free=True))
+
+
+@pytest.mark.parametrize("angles", [(pi, 0.0, 1.0), (0.0, pi, 1.0), (2.5, 0.4, 1.0), (0.0, -2.5, 1.2)])
+def test_any_attitude_is_reached_if_tilt_is_free(angles: tuple[float, float, float]) -> None:
+    wanted = quaternion_from_euler(*angles)
+    memory, before = FREE.initial(turned(0.0, 0.0, 1.0)), np.zeros(2)
+    for command in [attitude_command(wanted, nan)] * 200 + [
+        attitude_command(quaternion_from_euler(0, 0, 1.0), nan)
+    ] * 200:
+        memory, demand = FREE.step(memory, turned(*memory.angles.tolist()), command)
+        assert np.abs(demand.angles[0, :2] - before).max() < 0.07, "no jump"
+        assert demand.thrust_n.max() < 2.1 * WEIGHT_N
+        before = demand.angles[0, :2].copy()
+        if command.vector[2] < 0.99:
+            furthest = quaternion_from_euler(*memory.angles.tolist())
+    assert abs(np.dot(furthest, wanted)) > 0.999
+    assert np.abs(np.cos(memory.angles[:2])) == pytest.approx(1.0)
+    memory, demand = FREE.step(
+        FREE.initial(turned(0.0, 0.0, 1.0))._replace(angles=np.array((0.0, pi, 1.0))),
+        LEVEL,
+        tilt_command(0.0, 0.0, 0.0, nan),
+    )
+    assert np.isfinite(demand.angles).all()
 
 
 def test_it_begins_where_the_vehicle_is() -> None:

@@ -99,6 +99,25 @@ def test_offboard_attitude_then_rates_then_silence(sitl: Sitl) -> None:
     assert sitl.speed_m_s < 0.3
 
 
+@pytest.mark.sitl(profile="agile", airborne=40.0)
+@pytest.mark.parametrize(
+    "inverted",
+    [quaternion_from_euler(pi, 0.0, 0.5 * pi), quaternion_from_euler(0.0, pi, 0.5 * pi)],
+    ids=["roll", "pitch"],
+)
+def test_a_law_without_a_tilt_limit_flips(sitl: Sitl, inverted: Quaternion) -> None:
+    level = quaternion_from_euler(0.0, 0.0, 0.5 * pi)
+    attitude(sitl, EVERY_S, 7, level, STILL, 0.5)
+    sitl.select(Mode.OFFBOARD)
+    attitude(sitl, 0.3, 7, level, STILL, 1.0)
+    attitude(sitl, 0.55, 7, inverted, STILL, 0.05)
+    phi, theta, _ = sitl.euler
+    assert cos(phi) * cos(theta) < cos(radians(170.0))
+    attitude(sitl, 0.8, 7, level, STILL, 1.0)
+    assert [degrees(angle) for angle in sitl.euler[:2]] == pytest.approx([0.0, 0.0], abs=6.0)
+    assert sitl.position[2] > 37.0
+
+
 @pytest.mark.sitl(airborne=None)
 def test_attitude_without_thrust_lifts_nothing(sitl: Sitl) -> None:
     level = quaternion_from_euler(0.0, 0.0, 0.0)
