@@ -106,7 +106,6 @@ class Uploads:
         self._under_way: dict[int, _Upload] = {}
         self._reason = ""
         self._answers: dict[int, _Answer] = {}
-        self.due_us = NEVER_US
 
     def begin(
         self,
@@ -135,7 +134,11 @@ class Uploads:
         upload = self._under_way[plan_type] = _Upload(
             peer, plan_type, count, now_us, began_us, self._first_form, first, replaces
         )
-        return self._asking(upload, now_us)
+        return upload.ask(now_us)
+
+    @property
+    def due_us(self) -> int:
+        return min((upload.due_us for upload in self._under_way.values()), default=NEVER_US)
 
     def expects(self, peer: Peer, plan_type: int) -> bool:
         upload = self._under_way.get(plan_type)
@@ -150,7 +153,7 @@ class Uploads:
         if fields.seq < expected:  # a copy: to ask again would have every later item sent twice
             return None
         if fields.seq > expected:  # "the expected item should be re-requested"
-            return self._asking(upload, now_us)
+            return upload.ask(now_us)
         item = item_of(message.name, fields)
         if isinstance(item, int):
             self._blame(upload, expected, f"{command_name(fields.command)} at {fields.x:g}, {fields.y:g}")
@@ -162,7 +165,7 @@ class Uploads:
             return self._end(upload, result, 0, now_us)
         upload.take(item, now_us)
         if len(upload.items) < upload.count:
-            return self._asking(upload, now_us)
+            return upload.ask(now_us)
         return self._complete(upload, now_us)
 
     def acknowledged(self, peer: Peer, plan_type: int, result: int, now_us: int) -> Send | None:
@@ -171,7 +174,7 @@ class Uploads:
             return None
         if result == mav.MAV_MISSION_UNSUPPORTED and upload.asked_in_old_form:
             upload.old_form = False
-            return self._asking(upload, now_us)
+            return upload.ask(now_us)
         self.drop(peer, (plan_type,))
         return None
 
@@ -179,7 +182,6 @@ class Uploads:
         for plan_type in plan_types:
             if self.expects(peer, plan_type):
                 del self._under_way[plan_type]
-        self._schedule()
 
     def hush(self, peer: Peer) -> None:
         """End the peer's uploads silently if they time out."""
@@ -198,13 +200,7 @@ class Uploads:
             if not upload.quiet:
                 why = f"item {upload.next} of {upload.first + upload.count} did not arrive"
                 sends.append(self._refuse(upload.peer, mav.MAV_MISSION_OPERATION_CANCELLED, upload.plan_type, why))
-        self._schedule()
         return sends
-
-    def _asking(self, upload: _Upload, now_us: int) -> Send:
-        send = upload.ask(now_us)
-        self._schedule()
-        return send
 
     def _complete(self, upload: _Upload, now_us: int) -> Send:
         items = upload.whole
@@ -238,9 +234,6 @@ class Uploads:
         if answer is None or answer.peer != peer or answer.seq != fields.seq:
             return None
         return answer.send if ANSWER_AGAIN_AFTER_US <= now_us - answer.at_us < PATIENCE_US else None
-
-    def _schedule(self) -> None:
-        self.due_us = min((upload.due_us for upload in self._under_way.values()), default=NEVER_US)
 
 
 def ack(peer: Peer, result: int, plan_type: int, plan_id: int = 0) -> Send:

@@ -88,7 +88,6 @@ class CommandService:
         self._text = text
         self.closed = ""
         self._running: dict[int, _Running] = {}
-        self._report_at_us: int | None = None
         self._answered: dict[tuple[Peer, int], _Answered] = {}
         self._said: tuple[str, int] = ("", -SAME_REASON_AFTER_US)
 
@@ -110,16 +109,13 @@ class CommandService:
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        if self._report_at_us is None:
+        if not self._running:
             return IDLE
-        if 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
-            return ()
         sends = []
         for number, running in self._running.items():
             if not 0 < running.report_at_us - now_us <= PROGRESS_EVERY_US:
                 running.report_at_us = now_us + PROGRESS_EVERY_US
                 sends.append(_ack(number, running.command.peer, IN_PROGRESS))
-        self._schedule()
         return sends
 
     def finish(self, command_id: int, peer: Peer, refusal: Refusal | None) -> list[Send]:
@@ -127,7 +123,6 @@ class CommandService:
         if running is None or running.command.peer != peer:
             return []
         del self._running[command_id]
-        self._schedule()
         now_us = running.command.now_us
         return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
@@ -147,13 +142,9 @@ class CommandService:
         refusal = handler(command)
         if refusal is PENDING:
             self._running[command.id] = _Running(command, command.now_us + PROGRESS_EVERY_US)
-            self._schedule()
             return []
         ack = self._answered_with(command, confirmation, refusal, command.now_us)
         return [ack, *self._reason(refusal, command.now_us)]
-
-    def _schedule(self) -> None:
-        self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
 
     def _answered_with(self, command: ReceivedCommand, confirmation: int, refusal: Refusal | None, at_us: int) -> Send:
         key = (command.peer, command.id)
