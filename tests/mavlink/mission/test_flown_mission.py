@@ -8,15 +8,7 @@ from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.command import DENIED, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
-from tests.support.mission_ends import (
-    FIRST,
-    VEHICLE,
-    Ground,
-    fielded,
-    results,
-    some_item,
-    upload,
-)
+from tests.support.mission_ends import FIRST, VEHICLE, Ground, fielded, results, some_item, upload
 
 
 def test_the_current_item_is_marked() -> None:
