@@ -7,11 +7,7 @@ from colibri.mavlink.client.conversation import Encoded, Target
 from colibri.mavlink.wire.dialect import bits, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
-_GROUPS = (
-    bits("POSITION_TARGET_TYPEMASK_", "X_IGNORE Y_IGNORE Z_IGNORE"),
-    bits("POSITION_TARGET_TYPEMASK_", "VX_IGNORE VY_IGNORE VZ_IGNORE"),
-    bits("POSITION_TARGET_TYPEMASK_", "AX_IGNORE AY_IGNORE AZ_IGNORE"),
-)
+_GROUPS = [bits("POSITION_TARGET_TYPEMASK_", f"{of}X_IGNORE {of}Y_IGNORE {of}Z_IGNORE") for of in ("", "V", "A")]
 _NO_YAW = bits("POSITION_TARGET_TYPEMASK_", "YAW_IGNORE")
 _NO_YAW_RATE = bits("POSITION_TARGET_TYPEMASK_", "YAW_RATE_IGNORE")
 _NO_ATTITUDE = bits("ATTITUDE_TARGET_TYPEMASK_", "ATTITUDE_IGNORE")

@@ -50,8 +50,10 @@ class ActuatorCommand(NamedTuple):
 
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
-    turning, moving = _numbers(frame)
-    return [_ATTITUDE.encode(codec, turning), _POSITION.encode(codec, moving)]
+    time_us, (x, y, z), (vx, vy, vz), attitude, (p, q, r) = frame
+    time_ms = time_us // 1000
+    turning = _ATTITUDE.encode(codec, (time_ms, *ned_frd_from_enu_flu(attitude), p, -q, -r))
+    return [turning, _POSITION.encode(codec, (time_ms, y, x, -z, vy, vx, -vz))]
 
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
@@ -59,12 +61,6 @@ def state_as_received(frame: StateFrame) -> StateFrame | None:
     time_us, position, velocity, attitude, rate = frame
     numbers = _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
     return _frame(time_us - time_us % 1000, _SINGLES.unpack(numbers))
-
-
-def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    time_us, (x, y, z), (vx, vy, vz), attitude, (p, q, r) = frame
-    time_boot_ms = time_us // 1000
-    return (time_boot_ms, *ned_frd_from_enu_flu(attitude), p, -q, -r), (time_boot_ms, y, x, -z, vy, vx, -vz)
 
 
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:

@@ -10,12 +10,8 @@ import numpy as np
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.wire.missing_messages import CODES
 
-_ATTITUDE = "uint64_t timestamp;uint64_t timestamp_sample;float[4] q;"
-_RATES = "uint64_t timestamp;uint64_t timestamp_sample;float[3] xyz;"
-_POSITION = (
-    "uint64_t timestamp;uint64_t timestamp_sample;float x;float y;float z;float vx;float vy;float vz;"
-    "bool xy_valid;bool z_valid;bool v_xy_valid;bool v_z_valid;"
-)
+_ATTITUDE, _RATES = "uint64_t timestamp_sample; float[4] q", "uint64_t timestamp_sample; float[3] xyz"
+_POSITION = "uint64_t timestamp_sample; float x y z vx vy vz; bool xy_valid z_valid v_xy_valid v_z_valid"
 
 ATTITUDE_TRUTH, RATES_TRUTH = "vehicle_attitude_groundtruth", "vehicle_angular_velocity_groundtruth"
 POSITION_TRUTH, ESCS, BATTERY = "vehicle_local_position_groundtruth", "esc_status", "battery_status"
@@ -24,48 +20,44 @@ MOTORS, TRAJECTORY = "actuator_motors", "trajectory_setpoint"
 POSITION_SETPOINT, ATTITUDE_SETPOINT = "vehicle_local_position_setpoint", "vehicle_attitude_setpoint"
 MPC, SENSORS, ESTIMATOR, STATUS = "mpc_status", "sensor_combined", "estimator_status", "vehicle_status"
 
-TOPICS: Mapping[str, str] = {
+_BY_TYPE = {
     ATTITUDE_TRUTH: _ATTITUDE,
     RATES_TRUTH: _RATES,
     POSITION_TRUTH: _POSITION,
-    ESCS: "uint64_t timestamp;uint8_t esc_count;uint8_t esc_online_flags;uint8_t esc_armed_flags;esc_report[8] esc;",
+    ESCS: "uint8_t esc_count esc_online_flags esc_armed_flags; esc_report[8] esc",
     BATTERY: (
-        "uint64_t timestamp;float voltage_v;float current_a;float discharged_mah;float remaining;"
-        "float time_remaining_s;bool connected;uint8_t cell_count;uint8_t warning;"
+        "float voltage_v current_a discharged_mah remaining time_remaining_s; bool connected; "
+        "uint8_t cell_count warning"
     ),
     ATTITUDE: _ATTITUDE,
     RATES: _RATES,
     POSITION: _POSITION,
-    MOTORS: "uint64_t timestamp;uint64_t timestamp_sample;float[12] control;",
-    TRAJECTORY: (
-        "uint64_t timestamp;float[3] position;float[3] velocity;float[3] acceleration;float yaw;float yawspeed;"
-    ),
-    POSITION_SETPOINT: (
-        "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;float[3] acceleration;"
-        "float yaw;float yawspeed;"
-    ),
-    ATTITUDE_SETPOINT: "uint64_t timestamp;float[4] q_d;float[3] thrust_body;",
+    MOTORS: "uint64_t timestamp_sample; float[12] control",
+    TRAJECTORY: "float[3] position velocity acceleration; float yaw yawspeed",
+    POSITION_SETPOINT: "float x y z vx vy vz; float[3] acceleration; float yaw yawspeed",
+    ATTITUDE_SETPOINT: "float[4] q_d; float[3] thrust_body",
     MPC: (
-        "uint64_t timestamp;float solve_time_us;float control_step_us;float cost;float slack;float delay_us;"
-        "float mass_kg;float path_lag_s;float iterations;uint16_t active_rotors;uint16_t active_increments;"
-        "uint16_t active_angles;uint16_t active_rates;int8_t qp_status;int8_t fallback;"
+        "float solve_time_us control_step_us cost slack delay_us mass_kg path_lag_s iterations; "
+        "uint16_t active_rotors active_increments active_angles active_rates; int8_t qp_status fallback"
     ),
-    SENSORS: (
-        "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;int32_t accelerometer_timestamp_relative;"
-    ),
+    SENSORS: "float[3] gyro_rad accelerometer_m_s2; int32_t accelerometer_timestamp_relative",
     ESTIMATOR: (
-        "uint64_t timestamp;uint64_t timestamp_sample;float pos_horiz_accuracy;float pos_vert_accuracy;"
-        "float hdg_test_ratio;float vel_test_ratio;float pos_test_ratio;float hgt_test_ratio;float hagl_test_ratio;"
-        "uint16_t solution_status_flags;"
+        "uint64_t timestamp_sample; float pos_horiz_accuracy pos_vert_accuracy hdg_test_ratio vel_test_ratio "
+        "pos_test_ratio hgt_test_ratio hagl_test_ratio; uint16_t solution_status_flags"
     ),
     STATUS: (
-        "uint64_t timestamp;uint64_t armed_time;uint64_t takeoff_time;uint8_t arming_state;uint8_t nav_state;"
-        "uint8_t nav_state_user_intention;uint8_t vehicle_type;uint8_t system_type;uint8_t system_id;"
-        "uint8_t component_id;bool failsafe;bool is_vtol;bool in_transition_mode;bool pre_flight_checks_pass;"
+        "uint64_t armed_time takeoff_time; uint8_t arming_state nav_state nav_state_user_intention vehicle_type "
+        "system_type system_id component_id; bool failsafe is_vtol in_transition_mode pre_flight_checks_pass"
     ),
 }
-"""Fields by topic."""
 
+
+def _spelled(by_type: str) -> str:
+    rows = (row.split() for row in f"uint64_t timestamp; {by_type}".split("; "))
+    return "".join(f"{kind} {name};" for kind, *names in rows for name in names)
+
+
+TOPICS: Mapping[str, str] = {topic: _spelled(by_type) for topic, by_type in _BY_TYPE.items()}  # ULog's fields
 PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}  # nested types
 NUMBERS = {name: number for number, name in enumerate(TOPICS)}  # topic numbers, for all writers of a file
 _CODES = {**CODES, "bool": "?"}  # types as in `struct` and NumPy
