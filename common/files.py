@@ -49,6 +49,14 @@ def read_text(path: Path, encoding: str = "utf-8") -> str:
         return file.read()
 
 
+def read_given(path: Path, raises: type[Exception]) -> str:
+    """Read a text file of the user, with or without byte order mark, or raise `raises`."""
+    try:
+        return read_text(path, "utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise raises(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     with open(path, "wb", opener=regular) as file:
         file.write(content)

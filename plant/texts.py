@@ -7,7 +7,7 @@ from math import inf, nan
 from pathlib import Path
 
 from colibri.common.errors import unknown
-from colibri.common.files import read_text
+from colibri.common.files import read_given
 from colibri.common.process.arguments import number
 from colibri.plant.environment.noise import NOISES
 from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
@@ -62,12 +62,7 @@ def gust(text: str) -> Gust:
 
 
 def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
-    try:
-        lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()
-    except OSError as reason:
-        raise ArgumentTypeError(f"{path}: {reason.strerror}") from reason
-    except ValueError as reason:
-        raise ArgumentTypeError(f"{path}: {reason}") from reason
+    lines = (read_given(path, ArgumentTypeError) if text is None else text).splitlines()
     if not lines or lines[0].replace(" ", "") != COLUMNS:
         raise ArgumentTypeError(f"{path}: line 1: must be {COLUMNS}")
     rows = [_row(path, i, line) for i, line in enumerate(lines[1:], start=2) if line.strip()]

@@ -7,18 +7,19 @@ from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.core.defence.table import DELAY, STEP, nothing
-from colibri.autopilot.core.step import Received, Step, follows, nothing_known
+from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.guidance.guidance import Guidance
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame
 from colibri.mavlink.hil.world_changes import WorldChange
 
 if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
 
+_MISSED_US = 100_000  # frames may be missing so long: the model of the rotors still holds, more or less
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
@@ -97,11 +98,13 @@ class Autopilot(Generic[StagesT]):
         stages, now_us = self.stages, frame.time_us
         stages.receive(frame, plant_status)
         due = stages.loop.is_due(now_us)
-        begins = not follows(now_us, stages.time_us, self.frame_interval_us)
+        before_us = stages.time_us
+        begins = before_us is None or not 0 < now_us - before_us <= max(self.frame_interval_us, _MISSED_US)
         known = stages.estimate(frame, now=due or begins)
         if known is None:
             stages.wait(now_us)
-            return nothing_known(now_us, self._clock() - started_s)
+            standing = ActuatorCommand(now_us, (0.0,) * ROTORS, armed=False)
+            return Step(standing, None, self._clock() - started_s, known=False)
         stages.enter(known, now_us, begins=begins)
         flown: ControlSample | None = None
         decision = estimate = None

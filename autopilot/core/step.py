@@ -9,14 +9,8 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ROTORS, ActuatorCommand
+from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
-
-MISSED_US = 100_000  # frames may be missing so long: the model of the rotors still holds, more or less
-
-
-def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
-    return before_us is not None and 0 < time_us - before_us <= max(interval_us, MISSED_US)
 
 
 class Step(NamedTuple):
@@ -34,10 +28,6 @@ class Step(NamedTuple):
     delay_us: int = 0
     frame: Frame | None = None
     references: Horizon | None = None
-
-
-def nothing_known(time_us: int, duration_s: float) -> Step:
-    return Step(ActuatorCommand(time_us, (0.0,) * ROTORS, armed=False), None, duration_s, known=False)
 
 
 class Steps(Protocol):

@@ -12,17 +12,13 @@ from colibri.plant.vehicle.sensors import Barometer
 
 def _switched_on(part: Barometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     drift, rate = GaussMarkov(part.drift_pa, part.drift_time_s, chance), Rate(part.rate_hz)
-    ground_m, measured_us = setting.origin.altitude_m, None
+    ground_m = setting.origin.altitude_m
 
     def measure(world: World) -> float | None:
-        nonlocal measured_us
         if not rate.is_due(world.time_us):
             return None
-        if measured_us is not None:
-            drift.after((world.time_us - measured_us) * 1e-6)
-        measured_us = world.time_us
-        noise_pa = part.noise_pa * next(chance)
-        return pressure_pa(ground_m + world.state[8]) + drift.value + noise_pa
+        drift_pa = drift.at(world.time_us)
+        return pressure_pa(ground_m + world.state[8]) + drift_pa + part.noise_pa * next(chance)
 
     return measure
 

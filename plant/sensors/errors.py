@@ -16,11 +16,18 @@ class GaussMarkov:
 
     def __init__(self, deviation: float, time_s: float, chance: Chance) -> None:
         self._deviation, self._time_s, self._chance = deviation, time_s, chance
+        self._last_us: int | None = None
         self.value = deviation * next(chance)
 
     def after(self, elapsed_s: float) -> float:
         kept = exp(-elapsed_s / self._time_s)
         self.value = kept * self.value + self._deviation * sqrt(1.0 - kept * kept) * next(self._chance)
+        return self.value
+
+    def at(self, time_us: int) -> float:
+        if self._last_us is not None:
+            self.after((time_us - self._last_us) * 1e-6)
+        self._last_us = time_us
         return self.value
 
 

@@ -23,11 +23,10 @@ def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Meas
     sideways, upward = part.horizontal_drift_m, part.vertical_drift_m
     drifts = tuple(GaussMarkov(deviation, part.drift_time_s, chance) for deviation in (sideways, sideways, upward))
     pending: deque[GpsFix] = deque()
-    measured_us: int | None = None
 
     def fix(world: World) -> GpsFix:
         u, v, w, _, _, _, x, y, z = world.state[:9]
-        east, north, up = (drift.value for drift in drifts)
+        east, north, up = [drift.at(world.time_us) for drift in drifts]
         measured_m = (
             x + east + part.horizontal_noise_m * next(chance),
             y + north + part.horizontal_noise_m * next(chance),
@@ -50,12 +49,7 @@ def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Meas
         )
 
     def measure(world: World) -> GpsFix | None:
-        nonlocal measured_us
         if rate.is_due(world.time_us):
-            if measured_us is not None:
-                for drift in drifts:
-                    drift.after((world.time_us - measured_us) * 1e-6)
-            measured_us = world.time_us
             pending.append(fix(world))
         return pending.popleft() if pending and pending[0].time_us <= world.time_us else None
 

@@ -5,7 +5,7 @@ ArduPilot, AP_Motors_Thrust_Linearization.cpp, AP_Motors_Class.h, AP_GPS and SIT
 """
 
 from collections.abc import Callable
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, TypeAlias
 
 from colibri.mavlink.parameters.store import ParamType
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
@@ -28,14 +28,12 @@ _SPIN_MIN = 0.15
 _MAX_SPIN_MIN = 0.3
 
 
-class _Range(NamedTuple):
-    name: str
-    lowest: float
-    highest: float
-
-
-_PX4_HOVER, _PX4_DELAY_MS = _Range("MPC_THR_HOVER", 0.1, 0.8), _Range(PX4_DELAYS[0], 0.0, 300.0)
-_ARDUPILOT_HOVER, _ARDUPILOT_DELAY_MS = _Range("MOT_THST_HOVER", 0.125, 0.6875), _Range("GPS1_DELAY_MS", 0.0, 250.0)
+_RANGES = {
+    "MPC_THR_HOVER": (0.1, 0.8),
+    PX4_DELAYS[0]: (0.0, 300.0),
+    "MOT_THST_HOVER": (0.125, 0.6875),
+    "GPS1_DELAY_MS": (0.0, 250.0),
+}
 
 
 def px4_parameters(vehicle: Vehicle) -> Values:
@@ -57,10 +55,10 @@ def px4_parameters(vehicle: Vehicle) -> Values:
             values[f"CA_ROTOR{motor}_CT"] = _PX4_CT * rotors.strength[rotor]
         values[f"CA_ROTOR{motor}_KM"] = torque_m if rotors.direction[rotor] == "ccw" else -torque_m
     values["THR_MDL_FAC"] = 1.0 if rotors.control == "speed" else 0.0
-    values["MPC_THR_HOVER"] = _within(_PX4_HOVER, vehicle, "hover thrust", _hover_thrust(vehicle))
+    values["MPC_THR_HOVER"] = _within("MPC_THR_HOVER", vehicle, "hover thrust", _hover_thrust(vehicle))
     if vehicle.sensors is not None:
         delay_ms = px4_gps_delay_ms(vehicle)
-        _within(_PX4_DELAY_MS, vehicle, "sensors.gps.delay_s in ms", delay_ms)
+        _within(PX4_DELAYS[0], vehicle, "sensors.gps.delay_s in ms", delay_ms)
         values |= dict.fromkeys(PX4_DELAYS[:2], delay_ms) | {PX4_DELAYS[2]: float(delay_ms)}
         if delay_ms > _EKF2_DELAY_MAX_MS:
             values["EKF2_DELAY_MAX"] = float(delay_ms)
@@ -77,7 +75,7 @@ def ardupilot_parameters(vehicle: Vehicle) -> Values:
     if spin_min > _MAX_SPIN_MIN:
         why = f"ArduPilot's MOT_SPIN_MIN is at most {_MAX_SPIN_MIN:g}, not {spin_min:.2g}"
         raise VehicleError(f"{vehicle.name}: rotors.idle_speed: {why}")
-    least = _thrust_at(rotors, spin_min)
+    least = rotors.speeds_of((spin_min,))[0] ** 2
     hover = (_hover_thrust(vehicle) - least) / (1.0 - least)
     values: Values = {
         "FRAME_CLASS": frame_class,
@@ -87,14 +85,14 @@ def ardupilot_parameters(vehicle: Vehicle) -> Values:
         "MOT_SPIN_MIN": spin_min,
         "MOT_SPIN_MAX": 1.0,
         "MOT_THST_EXPO": expo,
-        "MOT_THST_HOVER": _within(_ARDUPILOT_HOVER, vehicle, "hover thrust", hover),
+        "MOT_THST_HOVER": _within("MOT_THST_HOVER", vehicle, "hover thrust", hover),
     }
     values["BATT_MONITOR"] = 4  # voltage and current; without a monitor ArduCopter hides BATT_FS_* and its limits
     if vehicle.battery is not None:
         values["BATT_CAPACITY"] = round(1e3 * vehicle.battery.capacity_ah)
     if vehicle.sensors is not None:
         delay_ms = round(vehicle.sensors.gps.delay_s * 1e3)
-        _within(_ARDUPILOT_DELAY_MS, vehicle, "sensors.gps.delay_s in ms", delay_ms)
+        _within("GPS1_DELAY_MS", vehicle, "sensors.gps.delay_s in ms", delay_ms)
         values["SIM_GPS1_LAG_MS"] = delay_ms
         values["GPS1_DELAY_MS"] = max(1, delay_ms)  # 0 is whatever the receiver's driver assumes
     return values
@@ -152,14 +150,10 @@ def _hover_thrust(vehicle: Vehicle) -> float:
     return weight_n / float(vehicle.max_wrench()[0])
 
 
-def _thrust_at(rotors: Rotors, control: float) -> float:
-    return rotors.speeds_of((control,) * 4)[0] ** 2
-
-
-def _within(allowed: _Range, vehicle: Vehicle, what: str, value: float) -> float:
-    if not allowed.lowest <= value <= allowed.highest:
-        limits = f"{allowed.name} is {allowed.lowest:g} to {allowed.highest:g}"
-        raise VehicleError(f"{vehicle.name}: {what} is {value:.3g}, and {limits}")
+def _within(name: str, vehicle: Vehicle, what: str, value: float) -> float:
+    lowest, highest = _RANGES[name]
+    if not lowest <= value <= highest:
+        raise VehicleError(f"{vehicle.name}: {what} is {value:.3g}, and {name} is {lowest:g} to {highest:g}")
     return value
 
 

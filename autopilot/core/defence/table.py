@@ -6,7 +6,6 @@ from typing import Final, NamedTuple
 class DefendedPart(NamedTuple):
     """A part, and its replacement as reported."""
 
-    name: str
     instead: str
     optional: bool = False  # off after `TRIES` exceptions; others are tried again each time
 
@@ -40,36 +39,33 @@ CHECKPOINT: Final = "checkpoint"
 PROCESS: Final = "process"
 
 PARTS: Final = {
-    part.name: part
-    for part in (
-        DefendedPart(BATTERY, "charge no longer known", optional=True),
-        DefendedPart(RESTART, "the previous flight is not resumed"),
-        DefendedPart(START, "begun anew"),
-        DefendedPart(ESTIMATOR, "inertial sensors carry on"),
-        DefendedPart(STANDBY, "attitude stays as it was"),
-        DefendedPart(DELAY, "the delay is not compensated", optional=True),
-        DefendedPart(ROTOR_WATCH, "lost rotors may go unnoticed", optional=True),
-        DefendedPart(SETPOINTS, "none are taken"),
-        DefendedPart(FAILSAFES, "none may act", optional=True),
-        DefendedPart(TASK, "hold"),
-        DefendedPart(GUIDANCE, "descending"),
-        DefendedPart(LAW, "plain law flies"),
-        DefendedPart(THREE_ROTORS, "last command stays"),
-        DefendedPart(PLAIN_LAW, "last command stays"),
-        DefendedPart(FAULTS, "none are injected"),
-        DefendedPart(STEP, "descending"),
-        DefendedPart(TELEMETRY, "old values are sent", optional=True),
-        DefendedPart(STATIONS, "not served in this frame"),
-        DefendedPart(DATAGRAM, "dropped"),
-        DefendedPart(PARAMETERS, "old values stay"),
-        DefendedPart(PROGRESS, "not reported"),
-        DefendedPart(HUB, "not polled in this frame"),
-        DefendedPart(LOG, "not recorded"),
-        DefendedPart(CHECKPOINT, "none for a restart", optional=True),
-        DefendedPart(PROCESS, "left out"),
-    )
+    BATTERY: DefendedPart("charge no longer known", optional=True),
+    RESTART: DefendedPart("the previous flight is not resumed"),
+    START: DefendedPart("begun anew"),
+    ESTIMATOR: DefendedPart("inertial sensors carry on"),
+    STANDBY: DefendedPart("attitude stays as it was"),
+    DELAY: DefendedPart("the delay is not compensated", optional=True),
+    ROTOR_WATCH: DefendedPart("lost rotors may go unnoticed", optional=True),
+    SETPOINTS: DefendedPart("none are taken"),
+    FAILSAFES: DefendedPart("none may act", optional=True),
+    TASK: DefendedPart("hold"),
+    GUIDANCE: DefendedPart("descending"),
+    LAW: DefendedPart("plain law flies"),
+    THREE_ROTORS: DefendedPart("last command stays"),
+    PLAIN_LAW: DefendedPart("last command stays"),
+    FAULTS: DefendedPart("none are injected"),
+    STEP: DefendedPart("descending"),
+    TELEMETRY: DefendedPart("old values are sent", optional=True),
+    STATIONS: DefendedPart("not served in this frame"),
+    DATAGRAM: DefendedPart("dropped"),
+    PARAMETERS: DefendedPart("old values stay"),
+    PROGRESS: DefendedPart("not reported"),
+    HUB: DefendedPart("not polled in this frame"),
+    LOG: DefendedPart("not recorded"),
+    CHECKPOINT: DefendedPart("none for a restart", optional=True),
+    PROCESS: DefendedPart("left out"),
 }
-"""All of them; services of the hub are parts under names of their own."""
+"""Services of the hub are parts under names of their own."""
 
 
 def nothing() -> None: ...

@@ -1,7 +1,7 @@
 """Accepted mission items (https://mavlink.io/en/messages/common.html#mav_commands); nan is the default of a value."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import isfinite, isnan
+from math import inf, isfinite, isnan
 from typing import NamedTuple, TypeAlias
 
 from colibri.common.earth.compiled_geodesy import enu_of
@@ -29,32 +29,22 @@ SKIPPED = frozenset[int](getattr(mav, f"MAV_CMD_{name}") for name in _PAYLOAD.sp
 _Check: TypeAlias = Callable[[float], bool]
 
 
-def _anything(_: float) -> bool:
-    return True
-
-
-def _not_infinite(value: float) -> bool:
-    return isnan(value) or isfinite(value)
-
-
-def _not_negative(value: float) -> bool:
-    return isnan(value) or (value >= 0.0 and isfinite(value))
-
-
-def _a_radius(value: float) -> bool:
-    return isnan(value) or abs(value) <= MAX_DISTANCE_M
+def _optional(check: _Check) -> _Check:
+    return lambda value: isnan(value) or check(value)
 
 
 def _one_of(*allowed: float) -> _Check:
-    return lambda value: isnan(value) or value in allowed
+    return _optional(lambda value: value in allowed)
 
 
 def _whole(minimum: int, maximum: int) -> _Check:
     return lambda value: isfinite(value) and minimum <= value <= maximum and value == int(value)
 
 
-def _a_speed(value: float) -> bool:
-    return isnan(value) or value in (-1.0, -2.0) or (value > 0.0 and isfinite(value))
+_NOT_INFINITE = _optional(isfinite)
+_NOT_NEGATIVE = _optional(lambda value: 0.0 <= value < inf)
+_A_RADIUS = _optional(lambda value: abs(value) <= MAX_DISTANCE_M)
+_A_SPEED = _optional(lambda value: value in (-1.0, -2.0) or 0.0 < value < inf)
 
 
 class _Allowed(NamedTuple):
@@ -62,27 +52,27 @@ class _Allowed(NamedTuple):
 
     place: bool = False
     height: bool = False
-    p1: _Check = _anything
-    p2: _Check = _anything
-    p3: _Check = _anything
-    p4: _Check = _anything
+    p1: _Check = lambda _: True
+    p2: _Check = lambda _: True
+    p3: _Check = lambda _: True
+    p4: _Check = lambda _: True
     here: bool = False
 
 
 _ALLOWED: Mapping[int, _Allowed] = {
-    mav.MAV_CMD_NAV_WAYPOINT: _Allowed(True, True, p1=_not_negative, p2=_not_negative, p4=_not_infinite),
-    mav.MAV_CMD_NAV_LOITER_UNLIM: _Allowed(True, True, p4=_not_infinite),
-    mav.MAV_CMD_NAV_LOITER_TURNS: _Allowed(True, True, p1=_not_negative, p3=_a_radius),
-    mav.MAV_CMD_NAV_LOITER_TIME: _Allowed(True, True, p1=_not_negative, p4=_not_infinite),
+    mav.MAV_CMD_NAV_WAYPOINT: _Allowed(True, True, p1=_NOT_NEGATIVE, p2=_NOT_NEGATIVE, p4=_NOT_INFINITE),
+    mav.MAV_CMD_NAV_LOITER_UNLIM: _Allowed(True, True, p4=_NOT_INFINITE),
+    mav.MAV_CMD_NAV_LOITER_TURNS: _Allowed(True, True, p1=_NOT_NEGATIVE, p3=_A_RADIUS),
+    mav.MAV_CMD_NAV_LOITER_TIME: _Allowed(True, True, p1=_NOT_NEGATIVE, p4=_NOT_INFINITE),
     mav.MAV_CMD_NAV_LOITER_TO_ALT: _Allowed(True, True),
-    mav.MAV_CMD_NAV_TAKEOFF: _Allowed(True, True, p4=_not_infinite, here=True),
-    mav.MAV_CMD_NAV_LAND: _Allowed(True, False, p4=_not_infinite, here=True),
+    mav.MAV_CMD_NAV_TAKEOFF: _Allowed(True, True, p4=_NOT_INFINITE, here=True),
+    mav.MAV_CMD_NAV_LAND: _Allowed(True, False, p4=_NOT_INFINITE, here=True),
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: _Allowed(),
-    mav.MAV_CMD_NAV_DELAY: _Allowed(p1=_not_negative),
-    mav.MAV_CMD_CONDITION_DELAY: _Allowed(p1=_not_negative),
+    mav.MAV_CMD_NAV_DELAY: _Allowed(p1=_NOT_NEGATIVE),
+    mav.MAV_CMD_CONDITION_DELAY: _Allowed(p1=_NOT_NEGATIVE),
     mav.MAV_CMD_CONDITION_YAW: _Allowed(p1=isfinite, p3=_one_of(-1.0, 0.0, 1.0), p4=_one_of(0.0, 1.0)),
     mav.MAV_CMD_DO_JUMP: _Allowed(p1=_whole(0, 0xFFFF), p2=_whole(-1, 0xFFFF)),
-    mav.MAV_CMD_DO_CHANGE_SPEED: _Allowed(p1=_one_of(0.0, 1.0, 2.0, 3.0), p2=_a_speed),
+    mav.MAV_CMD_DO_CHANGE_SPEED: _Allowed(p1=_one_of(0.0, 1.0, 2.0, 3.0), p2=_A_SPEED),
     mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),
 }
 FLOWN: frozenset[int] = frozenset(_ALLOWED)

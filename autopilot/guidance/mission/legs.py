@@ -113,8 +113,7 @@ def _land(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     return (LegPhase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
 
 
-def _delay(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
-    del context
+def _delay(item: MissionItem, _context: ItemContext) -> tuple[LegPhase, ...]:
     return (LegPhase(None, _after(_or_zero(item.p1)), reaches=True),)
 
 
@@ -182,6 +181,5 @@ def _after(wait_s: float) -> EndCondition:
     return lambda _, since_s: since_s >= wait_s
 
 
-def _landed(now: MissionContext, since_s: float) -> bool:
-    del since_s
+def _landed(now: MissionContext, _since_s: float) -> bool:
     return now.landed

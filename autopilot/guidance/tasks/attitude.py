@@ -7,7 +7,7 @@ from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, lead, moving_with, still_target
 from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
-from colibri.autopilot.guidance.tasks.sticks import stick_climb, without_play
+from colibri.autopilot.guidance.tasks.sticks import kept, stick_climb, without_play
 from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, PositionMotion, TaskContext, lifts
 from colibri.common.kernels import cos
 from colibri.mavlink.setpoints.setpoints import Sticks
@@ -73,10 +73,8 @@ class AltitudeTask(EndlessTask):
 
     def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
         climb_m_s = stick_climb(sticks, context)
-        if climb_m_s != 0.0:
-            self._height_m = None
-        elif self._height_m is None and abs(context.velocity[2]) < _RESTS_M_S:
-            self._height_m = context.place[2]
+        rests = abs(context.velocity[2]) < _RESTS_M_S
+        self._height_m = kept(self._height_m, context.place[2], climb_m_s == 0.0, rests)
         reference, target = vertically(context, climb_m_s, self._height_m)
         return reference, lifts(target, context.state)
 

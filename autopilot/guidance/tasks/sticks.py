@@ -1,14 +1,17 @@
 """The flight task of position mode."""
 
 from math import hypot
+from typing import TypeVar
 
-from colibri.autopilot.guidance.reference import BindingDerivative, Target, still_target
+from colibri.autopilot.guidance.reference import BindingDerivative, still_target
 from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.mavlink.setpoints.setpoints import Sticks, turned
 
 _DEADZONE = 0.05
 _SLOW_M_S, _SLOW_RAD_S = 0.1, 0.05
 _MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
+
+T = TypeVar("T")
 
 
 class PositionTask(EndlessTask):
@@ -20,44 +23,29 @@ class PositionTask(EndlessTask):
         self._yaw_rad: float | None = None
 
     def update(self, context: TaskContext) -> PositionMotion:
-        sticks = context.steered.sticks or _MIDDLE
-        target = still_target(context.place, context.yaw_rad, context.samples)
-        horizontally = self._move(target, stick_velocity(sticks, context), context)
-        vertically = self._climb(target, stick_climb(sticks, context), context)
-        self._turn(target, stick_yaw_rate(sticks, context), context)
-        kinds = (horizontally, horizontally, vertically)
-        return PositionMotion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), context.behaviour.limits)
+        sticks, place, velocity = context.steered.sticks or _MIDDLE, context.place, context.velocity
+        moves, climbs = stick_velocity(sticks, context), stick_climb(sticks, context)
+        turns = stick_yaw_rate(sticks, context)
+        slowly_turning = abs(float(context.reference.heading[1])) < _SLOW_RAD_S
+        self._xy = kept(self._xy, place[:2], moves == (0.0, 0.0), hypot(*velocity[:2]) < _SLOW_M_S)
+        self._z = kept(self._z, place[2], climbs == 0.0, abs(velocity[2]) < _SLOW_M_S)
+        self._yaw_rad = kept(self._yaw_rad, context.yaw_rad, turns == 0.0, slowly_turning)
+        x, y = self._xy or place[:2]
+        z, yaw_rad = place[2] if self._z is None else self._z, self._yaw_rad
+        free, bound = BindingDerivative.VELOCITY, BindingDerivative.POSITION
+        horizontally, vertically = free if self._xy is None else bound, free if self._z is None else bound
+        heading_rad = context.yaw_rad if yaw_rad is None else yaw_rad
+        target = still_target((x, y, z), heading_rad, context.samples, (horizontally, horizontally, vertically))
+        target.motion[:, 1] = (*moves, climbs)
+        target.heading[:, 1] = turns
+        return PositionMotion(target._replace(turns=yaw_rad is not None), context.behaviour.limits)
 
-    def _move(self, target: Target, velocity: tuple[float, float], context: TaskContext) -> BindingDerivative:
-        if velocity != (0.0, 0.0):
-            self._xy = None
-        elif self._xy is None and hypot(*context.velocity[:2]) < _SLOW_M_S:
-            self._xy = context.place[:2]
-        target.motion[:, 1, :2] = velocity
-        if self._xy is None:
-            return BindingDerivative.VELOCITY
-        target.motion[:, 0, :2] = self._xy
-        return BindingDerivative.POSITION
 
-    def _climb(self, target: Target, climb_m_s: float, context: TaskContext) -> BindingDerivative:
-        if climb_m_s != 0.0:
-            self._z = None
-        elif self._z is None and abs(context.velocity[2]) < _SLOW_M_S:
-            self._z = context.place[2]
-        target.motion[:, 1, 2] = climb_m_s
-        if self._z is None:
-            return BindingDerivative.VELOCITY
-        target.motion[:, 0, 2] = self._z
-        return BindingDerivative.POSITION
-
-    def _turn(self, target: Target, yaw_rate: float, context: TaskContext) -> None:
-        if yaw_rate != 0.0:
-            self._yaw_rad = None
-        elif self._yaw_rad is None and abs(float(context.reference.heading[1])) < _SLOW_RAD_S:
-            self._yaw_rad = context.yaw_rad
-        target.heading[:, 1] = yaw_rate
-        if self._yaw_rad is not None:
-            target.heading[:, 0] = self._yaw_rad
+def kept(before: T | None, now: T, centred: bool, slow: bool) -> T | None:
+    """Return what a centred stick holds: the value at which the motion became slow."""
+    if not centred:
+        return None
+    return now if before is None and slow else before
 
 
 def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:

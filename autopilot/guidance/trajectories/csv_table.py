@@ -9,7 +9,7 @@ import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import shown
-from colibri.common.files import read_text
+from colibri.common.files import read_given
 from colibri.common.types import Array
 
 MAX_DURATION_S = 3600.0
@@ -71,12 +71,7 @@ def read_table(
     `aliases` are other names, in lower case, with the column and the factor to its unit. With them the case of names is
     ignored, and unknown columns are left out.
     """
-    try:
-        lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()
-    except OSError as reason:
-        raise TrackFileError(f"{path}: {reason.strerror}") from reason
-    except ValueError as reason:
-        raise TrackFileError(f"{path}: {reason}") from reason
+    lines = (read_given(path, TrackFileError) if text is None else text).splitlines()
     known, cells = (*required, *optional), [cell.strip() for cell in lines[0].split(",")] if lines else []
     found = [(cell, 1.0) if aliases is None else aliases.get(cell.lower(), (cell.lower(), 1.0)) for cell in cells]
     header = [name for name, _ in found]

@@ -13,7 +13,7 @@ from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, FileOptions, Track
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.autopilot.spec import Trajectory
-from colibri.common.files import read_text
+from colibri.common.files import read_given
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -73,14 +73,7 @@ def file_text(name: str | Trajectory) -> str | None:
     if isinstance(name, Trajectory):
         return name.text
     path = file_of(name)
-    if path is None:
-        return None
-    try:
-        return read_text(Path(path), "utf-8-sig")
-    except OSError as error:
-        raise TrackError(f"{path}: {error.strerror}") from error
-    except ValueError as error:
-        raise TrackError(f"{path}: {error}") from error
+    return None if path is None else read_given(Path(path), TrackError)
 
 
 def with_file(name: str, path: Path) -> str:

@@ -138,17 +138,14 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
     def _position(self, t: TaylorSeries) -> Place:
-        alpha = self._alpha(t)
+        alpha = 2.0 * pi / self.lap * t
         x = self.size * sin(alpha)
         return x, x * cos(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
         """Return yaw along (cos α, cos 2α): relative to -90° it stays within ±180°, so it never wraps."""
-        alpha = self._alpha(t)
+        alpha = 2.0 * pi / self.lap * t
         return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
-
-    def _alpha(self, t: TaylorSeries) -> TaylorSeries:
-        return 2.0 * pi / self.lap * t
 
 
 class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -163,14 +160,11 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
     def _position(self, t: TaylorSeries) -> Place:
-        alpha = self._alpha(t)
+        alpha = self.speed / self.radius * t
         return self.radius * cos(alpha), self.radius * sin(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
-        return self._alpha(t) + 0.5 * pi
-
-    def _alpha(self, t: TaylorSeries) -> TaylorSeries:
-        return self.speed / self.radius * t
+        return self.speed / self.radius * t + 0.5 * pi
 
 
 class Ramped(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
