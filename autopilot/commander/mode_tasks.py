@@ -8,8 +8,8 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
+from colibri.autopilot.guidance.guidance import Instants
 from colibri.autopilot.guidance.reference import Reference, target_of
-from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.guided import GuidedSettings, GuidedTask

@@ -15,10 +15,9 @@ from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, St
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour, at_speed
-from colibri.autopilot.guidance.guidance import RESTS, Guidance
+from colibri.autopilot.guidance.guidance import RESTS, Guidance, Instants
 from colibri.autopilot.guidance.landing_detector import is_below, stands_at_first
 from colibri.autopilot.guidance.reference import Reference
-from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.position import HoldTask, TrackTask
 from colibri.autopilot.guidance.tasks.task import (
     NOT_STEERED,

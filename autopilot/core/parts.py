@@ -25,7 +25,7 @@ from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.guidance import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions

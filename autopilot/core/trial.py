@@ -13,8 +13,8 @@ from colibri.autopilot.core.defence.plain_law import PlainLaw
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.guidance import Instants
 from colibri.autopilot.guidance.reference import at_rest, lead, still_target
-from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.parameters.definitions import behaviour
 from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import Vehicle

@@ -224,8 +224,6 @@ class FreeServer(Server):
         while not self._stop:
             left_s = until_s - perf_counter()
             command = self._receive(max(0.0, left_s))
-            if command is not None:
+            if command is not None or left_s <= 0.0:
                 return command
-            if left_s <= 0.0:
-                return None
         return None

@@ -18,8 +18,7 @@ from colibri.autopilot.control.interface import Preview, VehicleState
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.guidance import RESTS, Guidance
-from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.guidance import RESTS, Guidance, instants
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, ClientInputs
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon, Pace, VehicleState
+from colibri.autopilot.guidance.guidance import Instants
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import (
     Reference,
@@ -17,7 +18,6 @@ from colibri.autopilot.guidance.reference import (
     stays,
     still_target,
 )
-from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.task import PlannedMotion, PositionMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
 

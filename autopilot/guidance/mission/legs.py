@@ -69,16 +69,13 @@ def phases_of(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 
 def _waypoint(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
-    radius = item.p2 if item.p2 > 0.0 else context.defaults.acceptance_m
-    return _there(item, context, radius, _or_zero(item.p1))
+    return _there(item, context, _or_zero(item.p1), item.p2 if item.p2 > 0.0 else None)
 
 
-def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[LegPhase, ...]:
-    return _there(item, context, context.defaults.acceptance_m, stay_s)
-
-
-def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[LegPhase, ...]:
-    place = context.place(item)
+def _there(
+    item: MissionItem, context: ItemContext, stay_s: float, radius_m: float | None = None
+) -> tuple[LegPhase, ...]:
+    place, radius_m = context.place(item), context.defaults.acceptance_m if radius_m is None else radius_m
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
     stay = (LegPhase(None, _after(stay_s)),) if stay_s > 0.0 else ()
@@ -137,11 +134,11 @@ def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 _LEGS: Mapping[int, Leg] = {
     mav.MAV_CMD_NAV_WAYPOINT: _waypoint,
-    mav.MAV_CMD_NAV_LOITER_UNLIM: lambda item, context: _loiter(item, context, inf),
-    mav.MAV_CMD_NAV_LOITER_TIME: lambda item, context: _loiter(item, context, _or_zero(item.p1)),
+    mav.MAV_CMD_NAV_LOITER_UNLIM: lambda item, context: _there(item, context, inf),
+    mav.MAV_CMD_NAV_LOITER_TIME: lambda item, context: _there(item, context, _or_zero(item.p1)),
     mav.MAV_CMD_NAV_LOITER_TURNS: _circle,
     # A multicopter climbs on the way: it is at the height when it is there.
-    mav.MAV_CMD_NAV_LOITER_TO_ALT: lambda item, context: _loiter(item._replace(p4=nan), context, 0.0),
+    mav.MAV_CMD_NAV_LOITER_TO_ALT: lambda item, context: _there(item._replace(p4=nan), context, 0.0),
     mav.MAV_CMD_NAV_TAKEOFF: _take_off,
     mav.MAV_CMD_NAV_LAND: _land,
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: (LegPhase(Return(), _landed, reaches=True),),

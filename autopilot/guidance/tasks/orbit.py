@@ -38,8 +38,8 @@ class OrbitTask(EndlessTask):
         if not self._circles:
             if not self._joins(context):
                 return self._way.update(context)
-            self._circles, self._angle = True, self._angle_of(context.place)
-            self._rate = self._rate_of(context)
+            self._circles, angle, (vx, vy, _) = True, self._angle_of(context.place), context.velocity
+            self._angle, self._rate = angle, (vy * cos(angle) - vx * sin(angle)) / self._radius_m
         rate = self._rate = self._towards(self._turn * self._speed_m_s(context) / self._radius_m, context)
         angles: Array = self._angle + rate * context.interval_s * np.arange(context.samples, dtype=np.float64)
         self._angle = float(angles[1])
@@ -49,10 +49,6 @@ class OrbitTask(EndlessTask):
 
     def _angle_of(self, place: Vector) -> float:
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
-
-    def _rate_of(self, context: TaskContext) -> float:
-        (vx, vy, _), angle = context.velocity, self._angle
-        return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
 
     def _towards(self, wanted: float, context: TaskContext) -> float:
         maximum = _SHARE * context.behaviour.limits.acceleration_m_s2 * context.interval_s / self._radius_m

@@ -1,6 +1,6 @@
 """Tracks tabulated at equal intervals."""
 
-from math import hypot
+from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ class Planner:
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
         self.preview, self._track, self._references = preview, track, references
-        self._rest = _rest(track, preview.interval_us)
+        ends_us, interval_us = track.duration_s * 1e6, preview.interval_us
+        self._rest = None if ends_us == inf else round(ends_us) // interval_us + 1
         self._length = _BLOCK_SAMPLES if self._rest is None else self._rest + 1
         self._block = 0
         self._ahead: tuple[int, int, Horizon] | None = None
@@ -75,10 +76,6 @@ def carried(horizon: Horizon, by_s: float) -> Horizon:
 
 def start_yaw(track: Track, references: References) -> float:
     return float(Planner(track, references, _START).horizon(0).yaw_rad[0])
-
-
-def _rest(track: Track, interval_us: int) -> int | None:
-    return None if np.isinf(track.duration_s) else round(track.duration_s * 1e6) // interval_us + 1
 
 
 def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:

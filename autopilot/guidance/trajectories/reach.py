@@ -136,7 +136,8 @@ class Reach:
         With c = c_xy + c_r √T, T z = m (a + g) + c v + (c_z - c) (v·z) z: thrust points along m (a + g) + c v.
         """
         airframe, v = self._airframe, motion.velocity
-        drag: Array = np.full((len(v), 1), self._drag_n_s_m)
+        hover_drag = airframe.drag_xy + airframe.rotor_drag * sqrt(airframe.mass_kg * airframe.gravity_m_s2)
+        drag: Array = np.full((len(v), 1), hover_drag)
         force = self._force(motion, drag)
         thrust = _length(force)[:, None]
         for _ in range(_REFINEMENTS if self._exact_drag else 0):
@@ -163,11 +164,6 @@ class Reach:
             Demand("thrust", "N a rotor", (even + apart).max(axis=1), most, span_n),
             Demand("thrust", "N a rotor", (even - apart).min(axis=1), least, span_n, falls=True),
         ]
-
-    @property
-    def _drag_n_s_m(self) -> float:
-        airframe = self._airframe
-        return airframe.drag_xy + airframe.rotor_drag * sqrt(airframe.mass_kg * airframe.gravity_m_s2)
 
 
 def times(track: Track) -> Array:

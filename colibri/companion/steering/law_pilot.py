@@ -18,8 +18,8 @@ from colibri.autopilot.control.registry import Factory
 from colibri.autopilot.control.vehicle_model import motion
 from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
 from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.guidance import instants
 from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.tasks.orders import GoTo
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, TrackTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, PlannedMotion, PositionMotion, TaskContext

@@ -8,9 +8,9 @@ import pytest
 from colibri.autopilot.commander.flight.reference_generator import ReferenceGenerator
 from colibri.autopilot.control.interface import Horizon, Pace, Preview, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.guidance import instants
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Reference, at_rest, lead, still_target
-from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.tasks.task import PositionMotion, TaskContext
 
 SAMPLES, INTERVAL_US = 30, 8_000
