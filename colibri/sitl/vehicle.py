@@ -32,8 +32,7 @@ from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
-from colibri.sitl.backends.lockstep import LockstepSession
-from colibri.sitl.backends.memory import Inside
+from colibri.sitl.backends.lockstep_session import Inside, LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Record, StatusTexts
 from colibri.sitl.ground_station import RefusedError, Station

@@ -12,7 +12,7 @@ from colibri.common.rotations import euler_from_quaternion, tilt_deg
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.wire.ned import ned_from_enu
-from colibri.sitl.backends.lockstep import LockstepSession
+from colibri.sitl.backends.lockstep_session import LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Columns, Record, StatusTexts
 from colibri.sitl.ground_station import Station

@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def _load() -> None:
-    from colibri.sitl.backends.lockstep import LockstepSession
+    from colibri.sitl.backends.lockstep_session import LockstepSession
     from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
     from colibri.sitl.backends.setting import setting_of
 

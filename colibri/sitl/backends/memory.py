@@ -1,10 +1,8 @@
-"""Plant and autopilot in this process, and as objects for tests of internal state."""
+"""Plant and autopilot in this process."""
 
 from time import perf_counter
 
 from colibri.autopilot.control.registry import DecisionError
-from colibri.autopilot.core.autopilot import Autopilot
-from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import answer
 from colibri.autopilot.process.ground import GroundService
 from colibri.autopilot.spec import AutopilotSpec
@@ -15,13 +13,12 @@ from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.plant.physics.start import IntegrationError
-from colibri.plant.physics.world import World, state_frame
+from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.spec import PlantSpec
-from colibri.sitl.backends.lockstep import LinkClock, LockstepSession, SessionError, StoppedClock
+from colibri.sitl.backends.lockstep import LinkClock, SessionError, StoppedClock
 from colibri.sitl.backends.setting import SettingError
-from colibri.sitl.errors import SitlError
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 
@@ -59,6 +56,7 @@ class MemoryPlant:
         self._answered = True
 
     def frame(self) -> list[bytes]:
+        """Return the datagrams up to the next frame, which comes last."""
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
@@ -156,44 +154,3 @@ class _MemoryConductor:
         self.to_stations = step_message
 
     def close(self) -> None: ...
-
-
-class Inside:
-    """Plant and autopilot, for tests of internal state; only in memory."""
-
-    def __init__(self, session: LockstepSession) -> None:
-        plant, autopilot = session.plant, session.autopilot
-        if not (isinstance(plant, MemoryPlant) and isinstance(autopilot, MemoryAutopilot)):
-            raise SitlError("nothing can be seen inside another process: fly with --sitl-link memory")
-        assert plant.plant is not None, "it has sent a frame"
-        self._session = session
-        self._side = autopilot
-        self.plant: Plant = plant.plant
-
-    @property
-    def autopilot(self) -> Autopilot[Copter]:
-        """The autopilot; a new one after a restart."""
-        return self._side.autopilot
-
-    @property
-    def copter(self) -> Copter:
-        return self._side.autopilot.stages
-
-    @property
-    def world(self) -> World:
-        return self.plant.world
-
-    @world.setter
-    def world(self, world: World) -> None:
-        self.plant.world = world
-        self._measure_again()
-
-    def skip(self, frames: int) -> None:
-        """Run the plant alone for some frames, with the last command."""
-        for _ in range(frames):
-            self.plant.go_on()
-        self._measure_again()
-
-    def _measure_again(self) -> None:
-        self._side.connect()
-        self._session.measure_again()
