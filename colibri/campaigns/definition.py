@@ -47,7 +47,6 @@ class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
         root_seed: Seed of the draws.
         grid: Factors with several values. A factor that is neither option nor key has levels: named tables of settings.
         draw: Factors drawn at random for each flight.
-
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")

@@ -11,18 +11,7 @@ from importlib import import_module
 from colibri.cli.shared.commands import PROCESSES
 from colibri.cli.shared.parser import parser_for, subcommand
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import (
-    EXIT_FAILED,
-    end_quickly,
-    fail,
-    fail_interrupted,
-    handle_endings,
-    interrupt,
-    loading,
-    one_line,
-    use_one_thread,
-    use_safe_path,
-)
+from colibri.common.process import lifecycle
 from colibri.common.process.output import use_streams
 from colibri.common.process.writable_folders import use_writable_folders
 
@@ -35,40 +24,40 @@ def main(argv: list[str] | None = None) -> int:
     warnings.formatwarning = lambda message, *_args: f"colibri: {message}\n"
     _check_encoding(given)
     if given and given[0] in PROCESSES:
-        with one_line(EXIT_FAILED):
+        with lifecycle.one_line(lifecycle.EXIT_FAILED):
             process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
             return process_code
-    use_one_thread()
-    use_safe_path()
+    lifecycle.use_one_thread()
+    lifecycle.use_safe_path()
     os.environ["MPLBACKEND"] = "agg"  # figures are files
-    end_quickly()
+    lifecycle.end_quickly()
     if threading.current_thread() is threading.main_thread():
-        handle_endings(interrupt)  # so that what was started is ended, too
+        lifecycle.handle_endings(lifecycle.interrupt)  # so that what was started is ended, too
     try:
-        with loading():
+        with lifecycle.loading():
             args, unknown = parser_for(given).parse_known_args(given)
         if unknown:
-            fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
+            lifecycle.fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-            fail("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
+            lifecycle.fail("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
         use_writable_folders()
         code = subcommand(args.command).run(args)
         sys.stdout.flush()
         return code
     except Error as error:
-        fail(str(error), EXIT_FAILED)
+        lifecycle.fail(str(error), lifecycle.EXIT_FAILED)
     except BrokenPipeError:  # nobody reads any more: `colibri show ... | head`
         _drop_what_cannot_be_printed()
-        return EXIT_FAILED
+        return lifecycle.EXIT_FAILED
     except OSError as error:
         if error.errno not in _NO_ROOM:
             if error.filename is None:
                 raise
-            fail(f"{error.filename}: {error.strerror}", EXIT_FAILED)
+            lifecycle.fail(f"{error.filename}: {error.strerror}", lifecycle.EXIT_FAILED)
         _drop_what_cannot_be_printed()
-        fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", EXIT_FAILED)
+        lifecycle.fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", lifecycle.EXIT_FAILED)
     except KeyboardInterrupt as ended:
-        fail_interrupted(ended)
+        lifecycle.fail_interrupted(ended)
 
 
 def _drop_what_cannot_be_printed() -> None:
@@ -83,4 +72,4 @@ def _check_encoding(given: Sequence[str]) -> None:
         try:
             word.encode()
         except UnicodeEncodeError:
-            fail(f"{word} is not UTF-8 by this locale: rename the file, or try LC_ALL=C.UTF-8")
+            lifecycle.fail(f"{word} is not UTF-8 by this locale: rename the file, or try LC_ALL=C.UTF-8")

@@ -36,7 +36,6 @@ class Flight:
     Attributes:
         report: The numbers of `report.json`.
         log: The topics of its log.
-
     """
 
     def __init__(self, plan: FlightPlan, report: Report, log: TopicReader) -> None:

@@ -41,7 +41,6 @@ class Member:
         instance: Ports and system id follow from it.
         links: URLs that its autopilot serves; once open, with actual ports.
         boot_unix_us: Start of its plant, which dates telemetry logs.
-
     """
 
     instance: int

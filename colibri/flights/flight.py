@@ -95,7 +95,6 @@ class InMemory:
     """Carries the datagrams of two processes in memory; `traffic` records all frames.
 
     A frame alone is only rounded as its datagram would round it, unless it is recorded, or of sensors and `replayed`.
-
     """
 
     def __init__(

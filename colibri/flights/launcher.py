@@ -3,7 +3,6 @@
 A child is forked if this process may be, as loading takes longer than most flights. Otherwise it is a command that
 reads its specification as JSON from standard input. Each has its own process group: Ctrl-C reaches only this process,
 which ends its children by SIGTERM, then by SIGKILL. A child also ends if this process dies.
-
 """
 
 import json

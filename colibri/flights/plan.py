@@ -57,7 +57,6 @@ class Contents(NamedTuple):
         plant_vehicle: Without the parts left out.
         track_file: Text of the track's file, if it has one.
         whole: The plant's vehicle with the parts left out; `None` in a recorded flight.
-
     """
 
     profile: Profile
@@ -74,7 +73,6 @@ class FlightPlan:
     Attributes:
         track: Track to fly, adapted to the vehicle's limits.
         track_note: Changes of the track, or the limit that it exceeds; else empty.
-
     """
 
     spec: FlightSpec
@@ -90,7 +88,6 @@ class FlightPlan:
         Raises:
             PlanError, EventError, LinkError: Options cannot be combined.
             ProfileError, VehicleError, TrackError: A file is invalid, or the vehicle cannot fly so.
-
         """
         checked("spec", spec, FlightSpec, "a FlightSpec, as of FlightSpec.of", PlanError)
         if spec.gcs and spec.link != "udp":

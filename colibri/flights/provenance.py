@@ -40,7 +40,6 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         profile: With the law, solver and delay of the options.
         plant_vehicle: Without the parts left out.
         sha256: Hash of each of these without names, and of all of them as `all`.
-
     """
 
     colibri: str

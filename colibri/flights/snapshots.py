@@ -3,7 +3,6 @@
 A snapshot follows every reference from its roots, and keeps a shallow copy of each mutable object. Immutable objects
 are shared; files, sockets and the state of modules and classes are left out. As objects stay the same, references to
 them stay valid, as in a callback.
-
 """
 
 from collections import deque

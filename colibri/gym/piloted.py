@@ -111,7 +111,6 @@ class PilotedEpisodes(Episodes):
         """Return the profile with a control interval that divides that of the actions, as close as possible to its own.
 
         Only the estimator has a frame between two control samples.
-
         """
         law, interval_ms = profile.controller, round(self.interval_s * 1e3)
         own_s = profile.table(law).get("control_interval_s", 1.0)

@@ -12,17 +12,8 @@ from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.process.station_events import StationEvents
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import unknown
+from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.conductor import Parcel
-from colibri.mavlink.hil.faults import (
-    SENSORS,
-    TABLE,
-    Equipment,
-    Fault,
-    judged,
-    kind_name,
-    number_of,
-    short_unit_name,
-)
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, behind
@@ -60,7 +51,6 @@ class Links(NamedTuple):
     Attributes:
         ground: Between the vehicle and all ground stations, in simulated time.
         plant: Between plant and autopilot; the flight stays the same, as frames are repeated.
-
     """
 
     ground: Trouble
@@ -82,7 +72,6 @@ class Sitl(View, Stepped, Steered):
         gcs: The first ground station, which sends commands.
         link: Link faults, which may be changed at any time.
         fleet: The vehicles in the same simulated time; empty if it flies alone.
-
     """
 
     items = items
@@ -307,7 +296,7 @@ class Sitl(View, Stepped, Steered):
             instance: From 1; 0 for all.
             values: Parameters 4 to 7.
         """
-        numbers = (number_of("FAILURE_UNIT", unit), number_of("FAILURE_TYPE", kind))
+        numbers = (faults.number_of("FAILURE_UNIT", unit), faults.number_of("FAILURE_TYPE", kind))
         params = (*map(float, numbers), float(instance), *values)
         self._injected += self._lockstep.command_to_plant(mav.MAV_CMD_INJECT_FAILURE, *params)
         before = len(self._lockstep.acks)
@@ -315,19 +304,20 @@ class Sitl(View, Stepped, Steered):
         results = [result for number, result in self._lockstep.acks[before:] if number == mav.MAV_CMD_INJECT_FAILURE]
         if results != [mav.MAV_RESULT_ACCEPTED]:
             result = results[0] if results else mav.MAV_RESULT_FAILED
-            raise RefusedError(f"failure {unit} {kind}", result, self._why_not(Fault(*numbers, instance), values))
+            why = self._why_not(faults.Fault(*numbers, instance), values)
+            raise RefusedError(f"failure {unit} {kind}", result, why)
 
-    def _why_not(self, fault: Fault, values: Sequence[float]) -> str:
-        kinds = [kind_name(kind).lower() for unit, kind in TABLE if unit == fault.unit]
+    def _why_not(self, fault: faults.Fault, values: Sequence[float]) -> str:
+        kinds = [faults.kind_name(kind).lower() for unit, kind in faults.TABLE if unit == fault.unit]
         if not kinds:
-            return f"choose one of {', '.join(dict.fromkeys(short_unit_name(unit) for unit, _ in TABLE))}"
-        if (fault.unit, fault.kind) not in TABLE:
+            return f"choose one of {', '.join(dict.fromkeys(faults.short_unit_name(unit) for unit, _ in faults.TABLE))}"
+        if (fault.unit, fault.kind) not in faults.TABLE:
             return f"choose one of {', '.join(kinds)}"
-        if fault.unit in SENSORS and self.setting.feedback is not Feedback.SENSORS:
+        if fault.unit in faults.SENSORS and self.setting.feedback is not Feedback.SENSORS:
             return f'feedback is "{self.setting.feedback}", and sensors are not used: set feedback="sensors"'
         p4, p5, p6, p7 = (*map(float, values), *(0.0,) * 4)[:4]
-        judgement = judged(fault._replace(values=(p4, p5, p6, p7)), tuple(Equipment))
-        missing = f"the vehicle has no {short_unit_name(fault.unit)}"
+        judgement = faults.judged(fault._replace(values=(p4, p5, p6, p7)), tuple(faults.Equipment))
+        missing = f"the vehicle has no {faults.short_unit_name(fault.unit)}"
         return judgement.reason if isinstance(judgement, Refusal) else missing
 
     @property

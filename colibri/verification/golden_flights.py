@@ -2,7 +2,6 @@
 
 Flights that saturate, tumble or use noisy sensors amplify one bit within a second, and find a difference. Others show
 where it matters.
-
 """
 
 from typing import TYPE_CHECKING, Any

@@ -2,7 +2,6 @@
 
 A request is a line of JSON on standard input: ["start", package, output file, specification], ["code", process id] or
 ["kill", process id]. The answer is a line: the process id, its exit code, or null.
-
 """
 
 import gc

@@ -20,7 +20,6 @@ class Launcher:
     """Starts processes `from_scratch` as a user does, or forks each autopilot from a loaded server.
 
     Plants then run in the test's process: on a shared core two processes make better use of the caches than three.
-
     """
 
     def __init__(self, *, from_scratch: bool = False) -> None:
@@ -89,7 +88,6 @@ def one_core(worker: int, workers: int) -> Iterator[None]:
     """Pin this thread and its processes to one core if workers occupy all cores.
 
     In lockstep one process computes at a time; waking another core costs much more.
-
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
     if not cores or not workers or workers % len(cores):  # a core may be idle, or would have more to do than others

@@ -4,14 +4,8 @@ from time import perf_counter, sleep
 from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.hil.conductor import StepMessage
-from colibri.mavlink.hil.state import (
-    ActuatorCommand,
-    StateFrame,
-)
-from colibri.mavlink.wire.dialect import (
-    TRUTH_COMPONENT,
-    mav,
-)
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.wire.dialect import TRUTH_COMPONENT, mav
 from colibri.sitl.errors import SitlError
 
 _QUICK = 10.0

@@ -15,14 +15,7 @@ from colibri.mavlink.hil.state import (
     read_state,
 )
 from colibri.mavlink.hil.world_changes import WorldChange, encode_change
-from colibri.mavlink.wire.dialect import (
-    AUTOPILOT_COMPONENT,
-    CMD_SET_MESSAGE_INTERVAL,
-    PLANT_COMPONENT,
-    RESULT_ACCEPTED,
-    TRUTH_COMPONENT,
-    Codec,
-)
+from colibri.mavlink.wire import dialect
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
 from colibri.sitl.backends.link_faults import Pipe, Trouble
@@ -46,15 +39,14 @@ class LockstepSession:
     Attributes:
         acks: Answers of the plant to commands: number and MAV_RESULT.
         trouble: Faults of the link between plant and autopilot.
-
     """
 
     def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, rotors: int, seed: int = 0) -> None:
         self.plant, self._rotors = plant, rotors
         self.autopilot = autopilot
-        self._codec = Codec(system, AUTOPILOT_COMPONENT)
+        self._codec = dialect.Codec(system, dialect.AUTOPILOT_COMPONENT)
         self._autopilot_source = bytes(self._codec.source)
-        self._truth_source = bytes((system, TRUTH_COMPONENT))
+        self._truth_source = bytes((system, dialect.TRUTH_COMPONENT))
         self.acks: list[tuple[int, int]] = []
         self.trouble = Trouble()
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
@@ -116,10 +108,10 @@ class LockstepSession:
 
     def command_to_plant(self, number: int, *params: float) -> bytes:
         values = (*params, *(0.0,) * (7 - len(params)))
-        return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
+        return self._codec.encode("COMMAND_LONG", self._codec.source[0], dialect.PLANT_COMPONENT, number, 0, *values)
 
     def change_of_world(self, change: WorldChange) -> bytes:
-        return encode_change(self._codec, change, (self._codec.source[0], PLANT_COMPONENT))
+        return encode_change(self._codec, change, (self._codec.source[0], dialect.PLANT_COMPONENT))
 
     def processes(self) -> dict[str, int]:
         sides = {"plant": self.plant.process, "autopilot": self.autopilot.process}
@@ -149,7 +141,7 @@ class LockstepSession:
             if message.name != "COMMAND_ACK":
                 continue
             number, result = message.fields.command, message.fields.result
-            if number == CMD_SET_MESSAGE_INTERVAL and result != RESULT_ACCEPTED:
+            if number == dialect.CMD_SET_MESSAGE_INTERVAL and result != dialect.RESULT_ACCEPTED:
                 raise SessionError("the plant cannot give the requested feedback: fly a vehicle with sensors")
             self.acks.append((number, result))
 
