@@ -32,9 +32,9 @@ Keep: TypeAlias = Callable[[Any], Kept]
 
 
 class ObjectSnapshot:
-    def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:
+    def __init__(self, roots: Iterable[object]) -> None:
         restores: list[Restore] = []
-        seen = {id(each): each for each in shared}
+        seen: dict[int, Any] = {}
         todo: list[Any] = [*roots]
         while todo:
             each = todo.pop()
@@ -50,7 +50,6 @@ class ObjectSnapshot:
                 restores.append(restore)
             todo.extend(referents)
         self._restores, self._seen = restores, seen  # all that was seen lives on: its numbers are not given away again
-        self.objects = len(restores)
 
     def restore(self) -> None:
         for restore in self._restores:

@@ -49,9 +49,9 @@ def described(name: str) -> str:
     return f"{signature(name)}: {meaning}" if mark.options else f"{signature(name)}: {meaning}: {', '.join(known)}"
 
 
-def setting_values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
+def setting_values(mark: pytest.Mark) -> dict[str, Any]:
     options = MARKS[mark.name].options
-    return {options.get(name, name): value for name, value in arguments(mark, of).items()}
+    return {options.get(name, name): value for name, value in arguments(mark).items()}
 
 
 def arguments(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
