@@ -1,4 +1,4 @@
-"""The flights of an arena: sets as TOML files, and what each of their rows needs."""
+"""The flights of an arena: sets as TOML files."""
 
 from collections.abc import Iterator
 from math import inf, isfinite
@@ -99,7 +99,7 @@ class Arena:
         return self._vehicles[given]
 
     def settings(self, row: Row, start: int) -> dict[str, Any]:
-        """Return the factors of a flight that starts at rest in hover, by `start` a millimetre beside its track."""
+        """Return the factors of a flight from hover, by `start` a millimetre beside its track."""
         vehicles = {key: self.vehicle(row, key) for key in ("vehicle", "plant_vehicle")}
         text, flown = self._track(row)
         x, y, z = (position(flown, np.zeros(1))[0] + 1e-3 * np.array(_OFFSETS_MM[start])).tolist()

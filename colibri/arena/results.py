@@ -38,7 +38,7 @@ _PUBLISHED = ("#777777", "#BBBBBB")
 
 
 class Cell(NamedTuple):
-    """A law in a row: the worst of its flights; errors in mm, a lost flight's at the cap."""
+    """The worst flights of a law in a row; errors in mm, a lost flight's at the cap."""
 
     flights: int
     lost: int

@@ -209,7 +209,7 @@ def read_seeds(given: Any) -> Sequence[int]:
 
 
 def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:
-    """Return the canonical name of a factor; a name in `others`, or one with levels, is kept."""
+    """Return the canonical name of a factor; `others` and names with levels are kept."""
     return given if given in others or has_levels(value) else factor_name(given)
 
 

@@ -1,4 +1,4 @@
-"""Values of factors, and their names: options of `colibri fly`, and dotted keys of profiles and vehicles."""
+"""Values of factors, and their names: options of `colibri fly` and dotted keys."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -198,7 +198,7 @@ _NOT_FACTORS = ("seed", "link", "speed")
 
 
 class Key(NamedTuple):
-    """A key of a profile or vehicle; `scaled` if its value is a multiplier."""
+    """A key of a profile or vehicle; a `scaled` value is a multiplier."""
 
     table: str
     key: str

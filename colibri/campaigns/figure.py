@@ -60,7 +60,7 @@ def draw(table: FlightTable, metric: str | None = None) -> Figure:
 
 
 def label_of(name: str) -> str:
-    """Return a metric's or factor's name in words, with its unit: "rmse_after_20s_m" is "RMSE after 20 s (m)"."""
+    """Return a name in words, with its unit: "rmse_after_20s_m" is "RMSE after 20 s (m)"."""
     option = fields_of(FlightSpec).get(name)
     parts, unit = name.split("."), option.option.unit if option else ""
     for place, part in enumerate(parts):

@@ -55,7 +55,7 @@ class MetricError(CampaignError, ForeignError):
 
 
 class Common(NamedTuple):
-    """What all flights share, with the contents of files, which a worker may not have."""
+    """What all flights share, with the contents of files."""
 
     fly: dict[str, Any]
     metrics: tuple[Metric, ...]
@@ -87,7 +87,7 @@ class FlightResult(NamedTuple):
 
 
 def common_of(campaign: Campaign, *, remote: bool = False) -> Common:
-    """Read what all flights share; `remote` workers are also given the control laws of files."""
+    """Read what all flights share, for `remote` workers with the laws of files."""
     profiles = {name: load_profile(name) for name in _names(campaign, "profile", "flight")}
     objects = [value for value in campaign.values("profile") if isinstance(value, Profile)]
     usual = {profile.simulation.vehicle for profile in (*profiles.values(), *objects)}

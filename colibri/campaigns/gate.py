@@ -23,7 +23,7 @@ def with_limits(metrics: Iterable[Metric], limits: Iterable[ReportLimit]) -> tup
 
 
 def handed_over(table: FlightTable, args: Namespace) -> int:
-    """Write the files of `--json` and `--junit`, report exceeded limits, and return the exit code."""
+    """Write `--json` and `--junit`, report exceeded limits, and return the exit code."""
     lost = loss_exceeds(args.fail_lost, len(table.flown) - table.verdicts[Verdict.FLOWN], len(table.flown))
     reasons = [_above(table, each, args.fail_above) for each in table.flown]
     wrong = [lost] if lost else []

@@ -55,7 +55,7 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
 
 
 def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
-    """Write the identity of a campaign or tuning into its folder; return whether it was there."""
+    """Write an identity into its folder; return whether it was there."""
     folder, scratch = path.parent, path.with_suffix(".new")
     now = msgspec.json.encode(identity)
     try:
@@ -131,7 +131,7 @@ def _hash(content: Any) -> str:
 
 
 def read_journal(path: Path) -> list[FlightResult]:
-    """Read the flights of a journal, and cut off an incomplete last line in the file."""
+    """Read the flights of a journal, and cut off an incomplete last line."""
     if not path.exists():
         return []
     with open(path, "r+b", opener=regular) as file:

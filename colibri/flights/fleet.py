@@ -113,7 +113,7 @@ def _plant_url(spec: FleetSpec, instance: int) -> str:
 
 
 def place_of(member: Member, spec: FleetSpec) -> HomePlace:
-    """Return a vehicle's home: a row to the east, each with its own origin."""
+    """Return a vehicle's home, in a row to the east."""
     home = spec.home
     if not member.east_m:
         return home

@@ -59,7 +59,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
         return None if self.out is None else self.out / str(instance)
 
     def connect(self) -> str:
-        """Return how clients connect; empty for links of the user's own, or where they do by themselves."""
+        """Return how clients connect; empty where they do by themselves."""
         told = self.identity == "ardupilot" and not self.gcs
         return _CONNECT.format(**ports(self.instance)) if told else ""
 

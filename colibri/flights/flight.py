@@ -31,7 +31,7 @@ Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 
 
 class Answered(NamedTuple):
-    """The answer to a frame as it reached the plant; `datagram` is empty if only rounded, `None` on `Direct`."""
+    """The answer as it reached the plant; `datagram` is empty if only rounded, `None` on `Direct`."""
 
     step: Step
     command: ActuatorCommand

@@ -109,7 +109,7 @@ def fly_processes(
 
 
 class _Wait:
-    """A bounded wait, which does not count the time for which this process is stopped."""
+    """A bounded wait; time for which this process is stopped does not count."""
 
     def __init__(self, allowed_s: float) -> None:
         self._allowed_s = allowed_s

@@ -15,7 +15,7 @@ FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "roto
 
 
 def prepare(out: Path) -> None:
-    """Make the folder of a flight and delete the files of an earlier one."""
+    """Make the folder of a flight, without files of an earlier one."""
     make_folder(out, without=(*LOGS, *FIGURES))
 
 

@@ -1,4 +1,4 @@
-"""A flight in this process: without sockets (`memory`), or also without the codec (`direct`)."""
+"""A flight in this process, over link `memory` or `direct`."""
 
 from collections.abc import Callable
 from math import isfinite

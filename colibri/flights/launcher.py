@@ -1,8 +1,8 @@
 """Start, watch and end plant and autopilot as child processes.
 
-A child is forked if this process may be, as loading takes longer than most flights. Otherwise it is a command that
-reads its specification as JSON from standard input. Each has its own process group: Ctrl-C reaches only this process,
-which ends its children by SIGTERM, then by SIGKILL. A child also ends if this process dies.
+A child is forked if possible, as loading takes longer than most flights, or else a command that reads its specification
+as JSON. Each has its own process group: Ctrl-C reaches only this process, which ends its children. A child also ends if
+this process dies.
 """
 
 import json

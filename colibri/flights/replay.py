@@ -94,7 +94,7 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def replay_flight(path: Path) -> Replayed:
-    """Replay a log or folder, with the profile, vehicle and waypoints in the log."""
+    """Replay a log or folder, with the inputs in the log."""
     return _compare(_read(path))
 
 

@@ -56,7 +56,7 @@ def parameter(text: str) -> dict[str, float]:
 
 
 def merged(given: Iterable[Any]) -> dict[str, float]:
-    """Return parameters of one table, or of several; a later value replaces an earlier one."""
+    """Return parameters of one table or several; later values replace earlier ones."""
     tables = [given] if isinstance(given, Mapping) else [parameter(it) if isinstance(it, str) else it for it in given]
     for table in tables:
         if not isinstance(table, Mapping):

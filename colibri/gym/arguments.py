@@ -34,7 +34,7 @@ def gate_points(given: Any) -> Array:
 
 
 def gates_of(points: Array, preview: int) -> Array:
-    """Return the gates of `kernels.judge_race`: each is passed in the direction from the one before to the next."""
+    """Return the gates of `judge_race`; each points from the one before to the next."""
     legs = np.diff(points, axis=0)
     ways = legs.copy()
     ways[:-1] += legs[1:]

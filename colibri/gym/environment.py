@@ -1,4 +1,4 @@
-"""The environments of gymnasium: one vehicle, and a vector of vehicles in one compiled loop."""
+"""The environments of gymnasium: one vehicle, or a compiled vector."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -157,7 +157,7 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
 
 
 def vector_env(num_envs: int = 1, **options: Any) -> VectorEnv[Values, Values, Any]:
-    """Return the vector of `gymnasium.make_vec`: compiled, or for actions through the autopilot one after another."""
+    """Return the vector of `gymnasium.make_vec`, compiled unless actions go through the autopilot."""
     if options.get("action") in PILOTED:
         return SyncVectorEnv([partial(QuadrotorEnv, **options)] * _count(num_envs))
     return QuadrotorVectorEnv(num_envs, **options)

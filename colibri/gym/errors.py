@@ -4,7 +4,7 @@ from colibri.common.errors import Error
 
 
 class GymError(Error):
-    """An environment cannot be made or stepped as requested; the message names the keyword."""
+    """An environment cannot be made or stepped as requested."""
 
 
 class GymImportError(GymError, ImportError):

@@ -1,4 +1,4 @@
-"""One control interval of many vehicles, compiled: rotor commands, motion, observation, reward and end."""
+"""One control interval of many vehicles, compiled."""
 
 from math import sqrt
 from typing import Any

@@ -24,7 +24,7 @@ _HEARTBEAT_S = 1.0
 
 
 class Picture:
-    """Draws the reference, or gates, the path flown and the vehicle, 640 by 480 pixels."""
+    """Draws reference or gates, path and vehicle, 640 by 480 pixels."""
 
     def __init__(self, episodes: Episodes) -> None:
         self._episodes = episodes

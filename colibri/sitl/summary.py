@@ -47,7 +47,7 @@ SAID = "sitl_said"
 
 
 def attachments(kept: list[Path], folder: Path) -> str:
-    """Return lines for the pictures of kept flights: relative to `folder`, for GitLab, then absolute, for Jenkins."""
+    """Return lines for the pictures of kept flights: relative to `folder` (GitLab), then absolute (Jenkins)."""
     from colibri.sitl.flight_record import FIGURE
 
     pictures = [place / FIGURE for place in kept if (folder / place / FIGURE).exists()]

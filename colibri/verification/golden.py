@@ -26,7 +26,7 @@ _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class GoldenResult(NamedTuple):
-    """The result of a golden flight; the hash is empty if it failed."""
+    """The result of a golden flight; without a hash it has failed."""
 
     name: str
     sha256: str

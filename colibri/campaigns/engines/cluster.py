@@ -26,7 +26,7 @@ class Cluster:
     is_remote = True
 
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
-        """Connect to a scheduler, or use a `distributed.Client`; without `batch`, the jobs per task adapt."""
+        """Without `batch`, the number of jobs per task adapts."""
         try:
             from distributed import Client
         except ImportError as error:

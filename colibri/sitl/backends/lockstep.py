@@ -1,4 +1,4 @@
-"""What both sides of a flight in lockstep share: clocks of the link, a frame, and its datagrams."""
+"""What both sides of a flight in lockstep share."""
 
 from time import perf_counter, sleep
 from typing import NamedTuple, TypeAlias

@@ -1,4 +1,4 @@
-"""A flight in lockstep: datagrams pass between plant and autopilot, of this process or others, frame by frame."""
+"""A flight in lockstep: plant and autopilot exchange datagrams, frame by frame."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
