@@ -6,8 +6,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
-import msgspec
-
 from colibri.autopilot.control.profile import Profile
 from colibri.flights.fly import fly_plan
 from colibri.flights.plan import FlightPlan
@@ -19,14 +17,13 @@ TRACK = "lemniscate"
 
 
 def with_blocks(profile: Profile, blocks: Sequence[int]) -> Profile:
-    table = profile.table(CONTROLLER)
-    return _with_table(profile, {**table, "plan": {**table["plan"], "blocks": list(blocks)}})
+    return profile.replace(f"controllers.{CONTROLLER}.plan.blocks", list(blocks))
 
 
 def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Profile:
-    simulation = msgspec.structs.replace(profile.simulation, frame_interval_s=frame_s)
-    changed = _with_table(profile, {**profile.table(CONTROLLER), "control_interval_s": control_s})
-    return msgspec.structs.replace(changed, simulation=simulation)
+    free = profile.replace("simulation.frame_interval_s", None)  # which must divide the control interval
+    changed = free.replace(f"controllers.{CONTROLLER}.control_interval_s", control_s)
+    return changed.replace("simulation.frame_interval_s", frame_s)
 
 
 def plan_of(
@@ -34,10 +31,6 @@ def plan_of(
 ) -> FlightPlan:
     options = {"profile": profile, "link": link, "feedback": feedback, "duration": duration_s, "out": folder}
     return FlightPlan.of(FlightSpec.of(TRACK, **options))
-
-
-def _with_table(profile: Profile, table: Mapping[str, Any]) -> Profile:
-    return msgspec.structs.replace(profile, controllers={**profile.controllers, CONTROLLER: dict(table)})
 
 
 Report: TypeAlias = Callable[[str], None]

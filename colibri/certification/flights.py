@@ -39,26 +39,20 @@ class Interval(NamedTuple):
     momentum: Momentum
 
 
-class BorderFlights(NamedTuple):
-    flights: int
-    duration_s: float
-    seed: int
-
-
-def fly(law: PlannedAttitude, entry: ProofEntry, plan: BorderFlights) -> FlownErrors:
+def fly(law: PlannedAttitude, entry: ProofEntry, flights: int, duration_s: float, *, seed: int) -> FlownErrors:
     """Fly from the border V = 1 to attitudes that may be held, under the largest disturbance.
 
     The moment is constant, random, at the resonance, or the worst for V.
     """
     numbers, proof = entry.numbers, entry.proof
-    flights, rng = plan.flights, np.random.default_rng(plan.seed)
+    rng = np.random.default_rng(seed)
     z = np.linalg.solve(np.linalg.cholesky(proof.P).T, _directions(rng, flights, STATES + INPUTS).T).T * _INSIDE
     held = rng.uniform(-1.0, 1.0, (flights, 2)) * HELD_RAD
     constant, kinds = _directions(rng, flights, INPUTS), np.arange(flights)[:, None] % _KINDS
     inertia, gain = np.array(numbers.inertia_kg_m2), np.array(numbers.commanded[0])
     flyer = law.flyer(entry, held, rng)
     states, beyond_n_m = [z], np.zeros(INPUTS)
-    for step in range(round(plan.duration_s / numbers.interval_s)):
+    for step in range(round(duration_s / numbers.interval_s)):
         commands, remembered = flyer.commands(z)
         beyond_n_m = np.maximum(beyond_n_m, np.abs(commands - z @ gain.T).max(axis=0))
         swinging = constant * np.sin(_RESONANCE_RAD_S * numbers.interval_s * step)

@@ -14,7 +14,7 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import ANGLES, PHI, PSI, RATES, THETA, CertifiedConditions, P, R
 from colibri.certification.certificate import Certificate, NotCertifiedError, ProofEntry
-from colibri.certification.flights import BorderFlights, FlownErrors, fly
+from colibri.certification.flights import FlownErrors, fly
 from colibri.certification.loop import AnyArray
 from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.common.errors import Error
@@ -113,7 +113,7 @@ def certify_profile(args: Namespace) -> int:
         found = certificates.certify(law, args.least, lambda what: None if args.quiet else _say(what))
     except NotCertifiedError as error:
         fail(f"{profile.where} on {vehicle.name}: refused: {error}", EXIT_FAILED)
-    flown = fly(law, found.invariant, BorderFlights(args.flights, _DURATION_S, args.seed))
+    flown = fly(law, found.invariant, args.flights, _DURATION_S, seed=args.seed)
     not_proven = (*law.not_proven, *_NOT_PROVEN)
     about = {
         "law": f"{law.what}, {profile.where}",

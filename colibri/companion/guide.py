@@ -15,27 +15,15 @@ from colibri.companion.stack import Response, Thrust
 from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.references import PastReference, ReferenceHistory, StepFlight, smoothly_started
+from colibri.companion.supervision import rules
 from colibri.companion.supervision.monitors import Consistency, SetpointRate
 from colibri.companion.supervision.phases import (
+    WITHIN_S,
     CompanionEnd,
     CompanionPhase,
     PhaseCondition,
-    Situation,
-    conditions,
     how_it_ended,
     next_phase,
-)
-from colibri.companion.supervision.rules import (
-    CRITICAL,
-    CheckFacts,
-    FlightFacts,
-    FlightRegion,
-    Rule,
-    ages_s,
-    box_of,
-    exceeded,
-    failing,
-    too_old,
 )
 from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer, moved_m
 from colibri.mavlink.wire.dialect import mav
@@ -75,7 +63,7 @@ class Companion:
         self._predictor.thrust_scale = settings.thrust_scale
         self._history = ReferenceHistory()
         self._orders = Orders(self.peer, settings, self._pilot.start_enu_m[2])
-        self._box = box_of(track, settings.duration_s, settings.limits.margin_m)
+        self._box = rules.box_of(track, settings.duration_s, settings.limits.margin_m)
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._thrust: Thrust | None = None
         self.phase, self._since_us = CompanionPhase.CONNECTING, 0
@@ -87,10 +75,10 @@ class Companion:
         self._law_error = self._fault = ""
         self._passed_us: int | None = None
         self._pace = SetpointRate()
-        self._stopped = self._brakes = self._on_way = self._has_flown = False
+        self._stopped = self._brakes = self._on_way = self.has_flown = False
         self.failing: list[str] = ["clock"]
         self.ended: CompanionEnd | None = None
-        self.limit: Rule[FlightFacts] | None = None
+        self.limit: rules.Rule[rules.FlightFacts] | None = None
         self.errors = TrackErrors()
         self.said: list[str] = []
         self.rows: list[LogRow] = []
@@ -116,10 +104,6 @@ class Companion:
         return ["all is checked: waits for a vehicle that flies, in a mode that holds or takes setpoints"]
 
     @property
-    def has_flown(self) -> bool:
-        return self._has_flown
-
-    @property
     def completed(self) -> bool:
         """Whether the track or all steps were flown."""
         return self._brakes
@@ -127,7 +111,7 @@ class Companion:
     def last_order(self) -> list[bytes]:
         """Return the order to hold, after an error."""
         stack = self.peer.stack
-        if stack is None or not self._has_flown:
+        if stack is None or not self.has_flown:
             return []
         fields = (*self.peer.target, mav.MAV_CMD_DO_SET_MODE, 0, *stack.hold.command, 0.0, 0.0, 0.0, 0.0)
         return [self.peer.client.encode("COMMAND_LONG", *fields)]
@@ -190,7 +174,7 @@ class Companion:
     def _advance(self, now_us: int) -> None:
         self._look(now_us)
         while self.ended is None:
-            after, why = next_phase(self.phase, conditions(self._situation(now_us)))
+            after, why = next_phase(self.phase, self._conditions(now_us))
             if why is None:
                 return
             self._enter(after, why, now_us)
@@ -199,9 +183,10 @@ class Companion:
         if self.phase is CompanionPhase.CHECKING:
             if self._settings.stay is not None and self._newest is not None:
                 place = self._settings.stay.place(self._newest.state.position_enu_m)
-                self._box = FlightRegion.at(place, self._settings.limits.margin_m)
+                self._box = rules.FlightRegion.at(place, self._settings.limits.margin_m)
             start = self._check_facts(now_us)
-            self.failing, self.peer.reports_are_old = failing(start), bool(too_old(start.ages, in_flight=False))
+            self.failing = rules.failing(start)
+            self.peer.reports_are_old = bool(rules.too_old(start.ages, in_flight=False))
             if self._settings.dry_run:
                 self._rehearse(now_us)
         elif (
@@ -209,7 +194,7 @@ class Companion:
             and self.limit is None
         ):
             facts = self._flight_facts(now_us)
-            self.limit = exceeded(facts)
+            self.limit = rules.exceeded(facts)
             if self.limit is not None:
                 self.said.append(f"{self.limit.name}: {self.limit.words(facts)}")
         self._consistency.jumped_m = 0.0
@@ -224,27 +209,34 @@ class Companion:
             self._passed_us = now_us
             self.said.append("all checks passed: the law runs, nothing is sent")
 
-    def _situation(self, now_us: int) -> Situation:
+    def _conditions(self, now_us: int) -> frozenset[PhaseCondition]:
         report, stack = self.peer.report, self.peer.stack
         waited_s = (self._since_us - (self._began_us or 0)) * 1e-6
-        return Situation(
-            phase=self.phase,
-            stack=stack,
-            in_phase_s=(now_us - self._since_us) * 1e-6,
-            gives_up_s=self._settings.gives_up_s - waited_s if self._passed_us is None else inf,
-            mode=report.mode,
-            modes=self._orders.own_modes(self.phase),
-            failing=len(self.failing) + self._settings.dry_run,
-            connected=self.peer.connected and self._thrust is not None,
-            armed=report.armed or self._orders.disarms,
-            airborne=report.airborne,
-            may_arm=self._settings.may_arm,
-            held=self._orders.held,
-            is_up=self._is_up(),
-            finished=self._finished(now_us),
-            must_end=self.limit is not None,
-            stopped=self._stopped or self._orders.refused != "",
-        )
+        gives_up_s = self._settings.gives_up_s - waited_s if self._passed_us is None else inf
+        within_s = inf if self.phase is CompanionPhase.FLYING else WITHIN_S.get(self.phase, gives_up_s)
+        found = {
+            PhaseCondition.STOPPED: self._stopped or self._orders.refused != "",
+            PhaseCondition.MUST_END: self.limit is not None,
+            PhaseCondition.CONNECTED: self.peer.connected and self._thrust is not None,
+            PhaseCondition.FINISHED: self._finished(now_us),
+            PhaseCondition.TOO_LATE: (now_us - self._since_us) * 1e-6 > within_s,
+        }
+        if stack is not None:
+            offboard, armed = report.mode == stack.offboard.custom, report.armed or self._orders.disarms
+            checked = not self.failing and not self._settings.dry_run
+            flies = armed and report.airborne is not False
+            may_arm = self._settings.may_arm and report.airborne is not True
+            found |= {
+                PhaseCondition.OFFBOARD: offboard,
+                PhaseCondition.HELD: self._orders.held,
+                PhaseCondition.PILOT: report.mode not in self._orders.own_modes(self.phase),
+                PhaseCondition.ARMED: armed,
+                PhaseCondition.DISARMED: not armed,
+                PhaseCondition.UP: self._is_up(),
+                PhaseCondition.CHECKED_IN_AIR: checked and flies and (offboard or report.mode in stack.steady),
+                PhaseCondition.CHECKED_TO_ARM: checked and not flies and may_arm,
+            }
+        return frozenset(condition for condition, holds in found.items() if holds)
 
     def _is_up(self) -> bool:
         if self._newest is None or not self.peer.report.armed or not self._orders.climbed:
@@ -267,7 +259,7 @@ class Companion:
         before, self.phase, self._since_us = self.phase, phase, now_us
         self.said.append(f"{phase}: {self._orders.refused or why.value}")
         if before is CompanionPhase.CHECKING:
-            self.said += failing(self._check_facts(now_us), required=False)
+            self.said += rules.failing(self._check_facts(now_us), required=False)
         if phase is CompanionPhase.CHECKING:
             self._pace.begin(now_us)
         if self._newest is not None and before is CompanionPhase.CHECKING and phase is not CompanionPhase.ENDED:
@@ -283,13 +275,13 @@ class Companion:
             self._predictor.begin()
             self._predictor.observe(self._newest.at_us, self._newest.state) if self._newest else None
             self._pilot.begin(self._predictor.at(self._acts_us(now_us)))
-            self._on_way, self._has_flown, self._predictor.learns = False, True, True
+            self._on_way, self.has_flown, self._predictor.learns = False, True, True
         elif phase is CompanionPhase.HANDING_OVER:
             self._pilot.hold()
             self._brakes = why is PhaseCondition.FINISHED
         elif phase is CompanionPhase.ENDED:
             fault = self._orders.refused or self._fault
-            if why is PhaseCondition.PILOT and self.peer.report.system_status in CRITICAL:
+            if why is PhaseCondition.PILOT and self.peer.report.system_status in rules.CRITICAL:
                 fault = fault or f"the vehicle reports an emergency (system status {self.peer.report.system_status})"
             elif self._settings.dry_run and before in (CompanionPhase.CONNECTING, CompanionPhase.CHECKING):
                 fault = fault or "; ".join(waits_for)
@@ -304,7 +296,7 @@ class Companion:
     def _setpoint(self, now_us: int) -> list[bytes]:
         rehearses = self._settings.dry_run and self.phase is CompanionPhase.CHECKING
         blind = self.limit is not None and self.limit.blind
-        flies = self._has_flown and self.phase in (CompanionPhase.FLYING, CompanionPhase.HANDING_OVER) and not blind
+        flies = self.has_flown and self.phase in (CompanionPhase.FLYING, CompanionPhase.HANDING_OVER) and not blind
         if (
             self._thrust is None
             or self._newest is None
@@ -359,16 +351,16 @@ class Companion:
         return {
             "report": peer.report,
             "state_age_s": self._age_s(now_us),
-            "ages": ages_s(peer.report, peer.clock.answered_us, now_us),
+            "ages": rules.ages_s(peer.report, peer.clock.answered_us, now_us),
             "contradiction": self._consistency.contradiction,
             "limits": self._settings.limits,
             "box": self._box,
         }
 
-    def _check_facts(self, now_us: int) -> CheckFacts:
+    def _check_facts(self, now_us: int) -> rules.CheckFacts:
         peer = self.peer
         assert peer.stack is not None, "it is connected"
-        return CheckFacts(
+        return rules.CheckFacts(
             **self._facts(now_us),
             stack=peer.stack,
             systems=tuple(peer.client.vehicles),
@@ -391,11 +383,11 @@ class Companion:
         here, stay = self._newest.state.position_enu_m, self._settings.stay
         return dist(here, self._pilot.start_enu_m if stay is None else stay.place(here))
 
-    def _flight_facts(self, now_us: int) -> FlightFacts:
+    def _flight_facts(self, now_us: int) -> rules.FlightFacts:
         newest, flies = self._newest, self.phase is CompanionPhase.FLYING
         place = newest.state.position_enu_m if newest else (nan, nan, nan)
         past = self._history.at(newest.at_us) if newest and flies else None
-        return FlightFacts(
+        return rules.FlightFacts(
             **self._facts(now_us),
             position_enu_m=place,
             tilt_deg=tilt_deg(newest.state.attitude) if newest else 0.0,

@@ -154,10 +154,7 @@ def fly(args: Namespace) -> int:
         write_report(figures, args.out / REPORT)
         if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
             if not companion.completed:
-                fail(
-                    f"the steps were not completed: no fit; logs are in {args.out}",
-                    EXIT_FAILED,
-                )
+                fail(f"the steps were not completed: no fit; logs are in {args.out}", EXIT_FAILED)
             _identify(companion, status, args.out)
     if stop.code and not companion.has_flown and not plan.settings.dry_run:
         fail("ended by a signal before it flew", stop.code)

@@ -119,13 +119,7 @@ def restart(subject: Subject, how: str, plan: FlightPlan) -> Restarted:
 
 
 def held(
-    phi: float,
-    theta: float,
-    *,
-    thrust_n: float,
-    controller: Any,
-    profile: Any = None,
-    vehicle: Any = None,
+    phi: float, theta: float, *, thrust_n: float, controller: Any, profile: Any = None, vehicle: Any = None
 ) -> VehicleState:
     """Hold roll and pitch, rad, and a thrust, N, for 1.5 s from hover; return the final state."""
     return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n)

@@ -1,13 +1,14 @@
 """Checks of the optional protocols."""
 
 from collections.abc import Callable, Iterator
-from math import acos, cos, degrees, isfinite, radians, sin
+from math import acos, degrees, isfinite, radians
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand
 from colibri.autopilot.control.registry import in_words
+from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from colibri.conformance import interface_checks as interface
 from colibri.conformance.interface_checks import Protocol, has, out_of_limits
 from colibri.conformance.loop_flight import HELD_S, hold
@@ -156,13 +157,7 @@ def _not_held(subject: Subject, phi: float, theta: float, thrust_n: float) -> st
 
 def _axis(phi: float, theta: float, psi: float) -> Any:
     """Return the body's z axis in ENU, (3,)."""
-    return np.array(
-        [
-            cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi),
-            cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi),
-            cos(phi) * cos(theta),
-        ]
-    )
+    return np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi)))[:, 2]
 
 
 def _compiled(subject: Subject, _: Any, steps: list[FlownStep]) -> str:

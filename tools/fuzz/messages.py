@@ -155,18 +155,9 @@ class Messages:
             (b"/", b"logs", b"/logs/a.tlog", b"@PARAM/param.pck", b"../../etc/passwd", b"a" * 239, b"")
         )
         size = chance.choice((len(name), 0, 239, 255, chance.randrange(256)))
-        head = struct.pack(
-            "<HBBBBBBI",
-            chance.getrandbits(16),
-            chance.randrange(4),
-            chance.randrange(20),
-            size,
-            0,
-            0,
-            0,
-            chance.choice((0, 1, 239, 2**31, 2**32 - 1)),
-        )
-        return (head + name).ljust(251, b"\0")[:251]
+        head = (chance.getrandbits(16), chance.randrange(4), chance.randrange(20), size, 0, 0, 0)
+        packed = struct.pack("<HBBBBBBI", *head, chance.choice((0, 1, 239, 2**31, 2**32 - 1)))
+        return (packed + name).ljust(251, b"\0")[:251]
 
     def _pick(self, choices: Sequence[Any]) -> Any:
         return self.chance.choice(choices)

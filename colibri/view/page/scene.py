@@ -6,16 +6,8 @@ import numpy as np
 import viser
 
 from colibri.common.types import Array, PerRotor
-from colibri.view.geometry import (
-    Colour,
-    about_up,
-    arrow,
-    blade_angles,
-    rotor_colour,
-    segments,
-    thrust_arrows,
-    zone_segments,
-)
+from colibri.view import geometry
+from colibri.view.geometry import Colour
 from colibri.view.snapshot import NO_POINTS, Mark, Snapshot, Surroundings, VehicleShape
 
 COLOURS: tuple[Colour, ...] = ((30, 110, 210), (230, 120, 20), (40, 150, 70), (150, 60, 170))
@@ -51,14 +43,8 @@ class VehicleScene:
         self._frame = scene.add_frame(self._root, show_axes=False)
         self._body = scene.add_frame(f"{self._root}/vehicle", show_axes=False)
         self._blades, self._discs = self._build(colour)
-        self._thrust = scene.add_arrows(
-            f"{self._root}/vehicle/thrust",
-            thrust_arrows(airframe, self._angles, scale),
-            colors=(200, 60, 60),
-            shaft_radius=0.06 * airframe.radius_m * scale,
-            head_radius=0.16 * airframe.radius_m * scale,
-            head_length=0.35 * airframe.radius_m * scale,
-        )
+        thrusts = geometry.thrust_arrows(airframe, self._angles, scale)
+        self._thrust = self._arrows("vehicle/thrust", thrusts, (200, 60, 60), 0.06, 0.16, 0.35)
         self._trail = self._line("trail", colour, 3.0)
         self._horizon = self._line("horizon", HORIZON, 5.0)
         self._to_reference = self._line("to_reference", REFERENCE, 1.5)
@@ -66,30 +52,23 @@ class VehicleScene:
         dot = 0.35 * airframe.radius_m * scale
         self._reference = scene.add_icosphere(f"{self._root}/reference", radius=dot, color=REFERENCE)
         self._estimate = scene.add_icosphere(f"{self._root}/estimate", radius=1.0, color=colour, opacity=0.1)
-        self._wind = scene.add_arrows(
-            f"{self._root}/wind",
-            _NO_SEGMENTS,
-            colors=WIND,
-            shaft_radius=0.12 * airframe.radius_m * scale,
-            head_radius=0.4 * airframe.radius_m * scale,
-            head_length=0.9 * airframe.radius_m * scale,
-        )
+        self._wind = self._arrows("wind", _NO_SEGMENTS, WIND, 0.12, 0.4, 0.9)
 
     def show(self, now: Snapshot, ground_m: float, layers: frozenset[str]) -> None:
         elapsed_s = 0.0 if self._time_s is None else min(max(now.time_s - self._time_s, 0.0), 0.2)
         self._time_s = now.time_s
-        self._angles = blade_angles(now.rotors, self._airframe.spins, self._angles, elapsed_s)
+        self._angles = geometry.blade_angles(now.rotors, self._airframe.spins, self._angles, elapsed_s)
         self._body.position = now.position_enu_m
         self._body.wxyz = now.attitude
         for blade, disc, angle, part in zip(self._blades, self._discs, self._angles, now.rotors, strict=True):
-            blade.wxyz = about_up(angle)
-            disc.color = rotor_colour(part)
-        _show(self._thrust, thrust_arrows(self._airframe, now.rotors, self._scale), layers, "thrust")
-        _show(self._trail, segments(now.trail), layers, "trail")
-        _show(self._horizon, segments(now.horizon), layers, "horizon")
-        _show(self._wind, arrow(now.position_enu_m, now.wind_enu_m_s, _WIND_S * self._scale), layers, "wind")
+            blade.wxyz = geometry.about_up(angle)
+            disc.color = geometry.rotor_colour(part)
+        _show(self._thrust, geometry.thrust_arrows(self._airframe, now.rotors, self._scale), layers, "thrust")
+        _show(self._trail, geometry.segments(now.trail), layers, "trail")
+        _show(self._horizon, geometry.segments(now.horizon), layers, "horizon")
+        _show(self._wind, geometry.arrow(now.position_enu_m, now.wind_enu_m_s, _WIND_S * self._scale), layers, "wind")
         east, north, up = now.position_enu_m
-        self._to_ground.points = segments(np.array([[east, north, ground_m], [east, north, up]]))
+        self._to_ground.points = geometry.segments(np.array([[east, north, ground_m], [east, north, up]]))
         self._show_reference(now, layers)
         self._show_estimate(now, layers)
 
@@ -102,7 +81,7 @@ class VehicleScene:
         if known:
             self._reference.position = now.reference_enu_m
         between = np.array([now.position_enu_m, now.reference_enu_m])
-        _show(self._to_reference, segments(between), layers, "reference")
+        _show(self._to_reference, geometry.segments(between), layers, "reference")
 
     def _show_estimate(self, now: Snapshot, layers: frozenset[str]) -> None:
         known = np.isfinite(now.estimate_enu_m).all() and "estimate" in layers
@@ -111,6 +90,12 @@ class VehicleScene:
             self._estimate.position = now.estimate_enu_m
             x, y, z = (3.0 * sigma for sigma in now.sigma_m)
             self._estimate.scale = (max(x, 0.01), max(y, 0.01), max(z, 0.01))
+
+    def _arrows(self, name: str, points: Any, colour: Colour, shaft: float, head: float, length: float) -> Any:
+        """Add arrows with radii and the length of the head in radii of a rotor."""
+        at, radius = f"{self._root}/{name}", self._airframe.radius_m * self._scale
+        sizes: Any = {"shaft_radius": shaft * radius, "head_radius": head * radius, "head_length": length * radius}
+        return self._scene.add_arrows(at, points, colors=colour, **sizes)
 
     def _line(self, name: str, colour: Colour, width: float) -> viser.LineSegmentsHandle:
         return self._scene.add_line_segments(
@@ -132,7 +117,7 @@ class VehicleScene:
                 dimensions=(length, 0.12 * radius, 0.1 * radius),
                 color=_FRONT if x > 0.0 and abs(y) <= x * 1.5 else _DARK,
                 position=(place[0] / 2.0, place[1] / 2.0, 0.0),
-                wxyz=about_up(yaw),
+                wxyz=geometry.about_up(yaw),
             )
             if self._airframe.foot_m:
                 foot = scale * self._airframe.foot_m
@@ -185,12 +170,12 @@ class SurroundingsScene:
         if np.isfinite(around.home_enu_m).all():
             self._marks("home", (Mark(around.home_enu_m, "home"),), HOME, below=True)
         for number, zone in enumerate(around.fence):
-            lines = zone_segments(zone, around.ground_m, around.ceiling_m)
+            lines = geometry.zone_segments(zone, around.ground_m, around.ceiling_m)
             colour = KEEPS_IN if zone.keeps_in else KEEPS_OUT
             self._add("mission, fence", self._segments(f"fence{number}", lines, colour, 2.5))
 
     def _line(self, layer: str, name: str, points: Array, colour: Any, width: float) -> None:
-        lines = segments(points)
+        lines = geometry.segments(points)
         if len(lines):
             self._add(layer, self._segments(name, lines, colour, width))
 

@@ -11,7 +11,7 @@ from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
 from colibri.certification.certificate import Certificate, ProofEntry
-from colibri.certification.flights import BorderFlights, Interval, fly, integrate
+from colibri.certification.flights import Interval, fly, integrate
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.certification.report import CERTIFICATE, FIGURE
@@ -77,7 +77,7 @@ def test_every_part_of_it_is_confirmed(part: str) -> None:
 
 @pytest.mark.parametrize("flights", [100, pytest.param(1000, marks=pytest.mark.long)])
 def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
-    flown = fly(FLIGHT, CERTIFIED.invariant, BorderFlights(flights, 1.0, seed=1))
+    flown = fly(FLIGHT, CERTIFIED.invariant, flights, 1.0, seed=1)
     assert flown.values.shape[1] == flights
     assert flown.values[0] == pytest.approx(np.ones(flights))
     assert flown.values.max() <= 1.0
@@ -85,7 +85,7 @@ def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
 
 def test_flights_tend_to_what_is_certified_at_least_as_fast() -> None:
     states, proof = (
-        fly(FLIGHT, CERTIFIED.invariant, BorderFlights(50, 0.5, seed=2)).states,
+        fly(FLIGHT, CERTIFIED.invariant, 50, 0.5, seed=2).states,
         CERTIFIED.attractor.proof,
     )
     values = np.einsum("tfi,ij,tfj->tf", states, proof.P, states)

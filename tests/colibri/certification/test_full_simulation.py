@@ -17,7 +17,7 @@ from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
-from colibri.certification.flights import BorderFlights, fly
+from colibri.certification.flights import fly
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion
@@ -128,7 +128,7 @@ def values(
 def test_flights_of_the_law_as_it_flies_stay_in_the_set(flights: int) -> None:
     rng, entry = np.random.default_rng(4), invariant()
     law = lpv_mpc.LpvMpc(table(NAME), VEHICLE, lambda: 0.0)
-    for i, start in enumerate(fly(CERTIFIED, entry, BorderFlights(flights, 0.0, seed=4)).states[0]):
+    for i, start in enumerate(fly(CERTIFIED, entry, flights, 0.0, seed=4).states[0]):
         began, *later = values(entry, law, start, disturbances(entry, i % 4, rng))
         assert began == pytest.approx(1.0)
         assert max(later) <= 1.0
