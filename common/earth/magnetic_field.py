@@ -19,9 +19,8 @@ _MIN_HEIGHT_KM, _MAX_HEIGHT_KM = -1.0, 850.0
 def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
     """Return the field in ENU of true north; the altitude is clamped to -1 to 850 km."""
     altitude_km = min(max(place.altitude_m / 1e3, _MIN_HEIGHT_KM), _MAX_HEIGHT_KM)
-    field = GeoMag(coefficients_data=WMM_2025).calculate(
-        glat=place.latitude_deg, glon=place.longitude_deg, alt=altitude_km, time=year
-    )
+    model = GeoMag(coefficients_data=WMM_2025)
+    field = model.calculate(place.latitude_deg, place.longitude_deg, altitude_km, year)
     return (_gauss(field.y), _gauss(field.x), _gauss(-field.z))
 
 

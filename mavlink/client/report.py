@@ -72,11 +72,9 @@ class VehicleReport:
             case "BATTERY_STATUS":
                 self._take_battery(fields, now_us)
             case "ESTIMATOR_STATUS":
-                self._tells_estimates, flags = True, fields.flags
-                self.reported_us["estimator"] = now_us
-                self.estimator_ok = (
-                    flags & _ESTIMATES == _ESTIMATES and bool(flags & _PLACES) and bool(flags & _HEIGHTS)
-                )
+                self._tells_estimates, self.reported_us["estimator"] = True, now_us
+                known = [fields.flags & each for each in (_ESTIMATES, _PLACES, _HEIGHTS)]
+                self.estimator_ok = known[0] == _ESTIMATES and all(known)
             case "GLOBAL_POSITION_INT":
                 self.altitude_amsl_m, self.reported_us["altitude"] = fields.alt * _MM, now_us
             case "HOME_POSITION":

@@ -59,20 +59,15 @@ class MemoryFiles:
         return refusal
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        refusal = self._no_way(old) if old else FileRefusal.PROTECTED
-        refusal = refusal or (self._no_way(new) if new else FileRefusal.PROTECTED)
-        if refusal is not None:
-            return refusal
-        if old not in self._files and old not in self._folders:
-            return FileRefusal.NOT_FOUND
-        refusal = self._no_place(new)
-        if refusal is not None:
-            return refusal
-        if new[: len(old)] == old:
-            return FileRefusal.BAD_NAME
-        self._files = {_moved(path, old, new): data for path, data in self._files.items()}
-        self._folders = {_moved(path, old, new) for path in self._folders}
-        return None
+        old_refusal = self._no_way(old) if old else FileRefusal.PROTECTED
+        refusal = old_refusal or (self._no_way(new) if new else FileRefusal.PROTECTED)
+        if refusal is None and old not in self._files and old not in self._folders:
+            refusal = FileRefusal.NOT_FOUND
+        refusal = refusal or self._no_place(new) or (FileRefusal.BAD_NAME if new[: len(old)] == old else None)
+        if refusal is None:
+            self._files = {_moved(path, old, new): data for path, data in self._files.items()}
+            self._folders = {_moved(path, old, new) for path in self._folders}
+        return refusal
 
     def make_folder(self, names: Names) -> FileRefusal | None:
         refusal = self._no_room(names)

@@ -120,11 +120,8 @@ class TcpServer(Endpoint):
     def receive_now(self) -> list[tuple[bytes, Address]]:
         if not self._connections or perf_counter() >= self._accept_at_s:
             self._accept()
-        received = [
-            (frame, connection.address)
-            for connection in self._connections.values()
-            for frame in connection.receive_now()
-        ]
+        connections = self._connections.values()
+        received = [(frame, each.address) for each in connections for frame in each.receive_now()]
         self._forget_dead()
         return received
 

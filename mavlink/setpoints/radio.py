@@ -59,10 +59,8 @@ class Radio(Manual):
         changes: dict[int, int] = {}
         for number, value in enumerate(given, start=1):
             extended = number >= _FIRST_EXTENDED
-            if value == UNCHANGED or (extended and value == RELEASED):
-                continue
-            released = value == RELEASED or (extended and value == _RELEASED_EXTENDED)
-            changes[number] = RELEASED if released else value
+            if value != UNCHANGED and not (extended and value == RELEASED):
+                changes[number] = RELEASED if extended and value == _RELEASED_EXTENDED else value
         self._override(changes, now_us)
         return None
 

@@ -30,12 +30,8 @@ def fitted(name: str, encoder: Encoder) -> Encoder:
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
 
     def fit(fields: Fields) -> Fields:
-        return tuple(
-            [
-                tuple(map(convert, value)) if type(value) is tuple else convert(value)
-                for convert, value in zip(converters, fields, strict=False)
-            ]
-        )
+        pairs = zip(converters, fields, strict=False)
+        return tuple([tuple(map(to, value)) if type(value) is tuple else to(value) for to, value in pairs])
 
     def encode(snapshot: TelemetrySnapshot) -> Fields | list[Fields] | None:
         try:
