@@ -77,11 +77,10 @@ class DataFlashRecorder:
 
         now_us = s.time_us
         if changed(lambda each: each.origin, None):
-            place = s.origin
-            self._add("ORGN", now_us, _EKF_ORIGIN, place.latitude_deg, place.longitude_deg, place.altitude_m)
+            self._add("ORGN", now_us, _EKF_ORIGIN, *s.origin)
         if s.home is not None and changed(lambda each: each.home, None):
             place = s._replace(position_enu_m=s.home.position_enu_m).place
-            self._add("ORGN", now_us, _HOME, place.latitude_deg, place.longitude_deg, place.altitude_m)
+            self._add("ORGN", now_us, _HOME, *place)
         if changed(lambda each: each.custom_mode, None):
             self._add("MODE", now_us, s.custom_mode & 0xFF, s.custom_mode & 0xFF, 0)
         if changed(lambda each: each.armed, False):
@@ -103,8 +102,7 @@ class DataFlashRecorder:
         place, (east, north, up) = (s.place, s.velocity_enu_m_s) if fix is None else (fix.place, fix.velocity_enu_m_s)
         kind, seen = (mav.GPS_FIX_TYPE_3D_FIX, SATELLITES) if fix is None else (fix.fix_type, fix.satellites)
         course = compass_cdeg(atan2(north, east)) / 100.0
-        where = (place.latitude_deg, place.longitude_deg, place.altitude_m)
-        return (0, kind, week_ms, week, seen, DILUTION_E2 / 100, *where, hypot(east, north), course, -up, 0.0, True)
+        return (0, kind, week_ms, week, seen, DILUTION_E2 / 100, *place, hypot(east, north), course, -up, 0.0, True)
 
     def _add_row(self, name: str, row: _Row, s: TelemetrySnapshot) -> None:
         """Add a row; one without valid numbers is omitted."""
@@ -172,9 +170,7 @@ def _position(axis: int) -> _Row:
 
 
 def _place(s: TelemetrySnapshot) -> tuple[Value, ...]:
-    place = s.place
-    where = (place.latitude_deg, place.longitude_deg, place.altitude_m)
-    return (*where, s.height_above_home_m, s.position_enu_m[2])
+    return (*s.place, s.height_above_home_m, s.position_enu_m[2])
 
 
 def _battery(s: TelemetrySnapshot) -> tuple[Value, ...]:
