@@ -1,16 +1,15 @@
 """The plant's barometer: standard atmosphere, slow drift, noise."""
 
 from colibri.common.earth.atmosphere import pressure_pa
-from colibri.mavlink.hil.faults import BAROMETER
-from colibri.mavlink.hil.sensors import Updated
+from colibri.common.types import Vector
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Barometer
 
 
-def _switched_on(part: Barometer, setting: SensorSurroundings, chance: Chance) -> Measure:
+def switched_on(part: Barometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     drift, rate = GaussMarkov(part.drift_pa, part.drift_time_s, chance), Rate(part.rate_hz)
     ground_m = setting.origin.altitude_m
 
@@ -23,11 +22,5 @@ def _switched_on(part: Barometer, setting: SensorSurroundings, chance: Chance) -
     return measure
 
 
-ROW = Instrument(
-    part="barometer",
-    field="pressure_pa",
-    group=Updated.BAROMETER,
-    unit=BAROMETER,
-    switched_on=_switched_on,
-    add=lambda pascal, error: pascal + error[0],
-)
+def shifted(pressure: float, error: Vector) -> float:
+    return pressure + error[0]

@@ -7,17 +7,16 @@ from math import hypot
 from colibri.common.earth.compiled_geodesy import geodetic_of
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
-from colibri.mavlink.hil.faults import GPS
 from colibri.mavlink.hil.sensors import GpsFix
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Gps
 
 
-def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Measure:
+def switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Measure:
     """Measure position with white and correlated errors, velocity with white ones; report after the delay."""
     rate, delay_us = Rate(part.rate_hz), round(part.delay_s * 1e6)
     sideways, upward = part.horizontal_drift_m, part.vertical_drift_m
@@ -56,16 +55,5 @@ def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Meas
     return measure
 
 
-def _moved(fix: GpsFix, error: Vector) -> GpsFix:
+def moved(fix: GpsFix, error: Vector) -> GpsFix:
     return replace(fix, place=geodetic_of(error, fix.place))
-
-
-ROW = Instrument(
-    part="gps",
-    field="gps",
-    group=0,
-    unit=GPS,
-    switched_on=_switched_on,
-    add=_moved,
-    at=lambda fix, now_us: replace(fix, time_us=now_us),
-)

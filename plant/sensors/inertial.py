@@ -1,22 +1,20 @@
 """The plant's accelerometer and gyroscope, sampled at every frame."""
 
-from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
-from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import Triad
-from colibri.plant.sensors.instrument import Instrument, Measure, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, SensorSurroundings
 from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
 
-def _accelerometer(part: Accelerometer, setting: SensorSurroundings, chance: Chance) -> Measure:
+def accelerometer(part: Accelerometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
     errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
     specific_force = setting.physics.specific_force
     return lambda world: errors.measure(specific_force(world))
 
 
-def _gyroscope(part: Gyroscope, setting: SensorSurroundings, chance: Chance) -> Measure:
+def gyroscope(part: Gyroscope, setting: SensorSurroundings, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
     errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
 
@@ -25,19 +23,3 @@ def _gyroscope(part: Gyroscope, setting: SensorSurroundings, chance: Chance) -> 
         return errors.measure((p, q, r))
 
     return measure
-
-
-ACCELEROMETER_ROW = Instrument(
-    part="accelerometer",
-    field="specific_force_flu_m_s2",
-    group=Updated.ACCELEROMETER,
-    unit=ACCELEROMETER,
-    switched_on=_accelerometer,
-)
-GYROSCOPE_ROW = Instrument(
-    part="gyroscope",
-    field="rate_flu_rad_s",
-    group=Updated.GYROSCOPE,
-    unit=GYROSCOPE,
-    switched_on=_gyroscope,
-)

@@ -3,16 +3,14 @@
 from colibri.common.earth.magnetic_field import field_enu_gauss
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
-from colibri.mavlink.hil.faults import MAGNETOMETER
-from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Magnetometer
 
 
-def _switched_on(part: Magnetometer, setting: SensorSurroundings, chance: Chance) -> Measure:
+def switched_on(part: Magnetometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     earth_gauss, rate, noise = field_enu_gauss(setting.origin), Rate(part.rate_hz), part.noise_gauss
     own = part.hard_iron_gauss
     iron = (own * next(chance), own * next(chance), own * next(chance))
@@ -29,12 +27,3 @@ def _switched_on(part: Magnetometer, setting: SensorSurroundings, chance: Chance
         )
 
     return measure
-
-
-ROW = Instrument(
-    part="magnetometer",
-    field="magnetic_field_flu_gauss",
-    group=Updated.MAGNETOMETER,
-    unit=MAGNETOMETER,
-    switched_on=_switched_on,
-)

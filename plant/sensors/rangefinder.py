@@ -3,18 +3,18 @@
 from math import hypot, inf
 
 from colibri.common.kernels import acos, cos
-from colibri.mavlink.hil.faults import RANGEFINDER
+from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import Distance
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Rangefinder
 
 _FLATTEST_COSINE = 1e-3
 
 
-def _switched_on(part: Rangefinder, _setting: SensorSurroundings, chance: Chance) -> Measure:
+def switched_on(part: Rangefinder, _setting: SensorSurroundings, chance: Chance) -> Measure:
     rate, half_beam_rad = Rate(part.rate_hz), 0.5 * part.field_of_view_rad
 
     def measure(world: World) -> Distance | None:
@@ -35,11 +35,5 @@ def _switched_on(part: Rangefinder, _setting: SensorSurroundings, chance: Chance
     return measure
 
 
-ROW = Instrument(
-    part="rangefinder",
-    field="distance",
-    group=0,
-    unit=RANGEFINDER,
-    switched_on=_switched_on,
-    add=lambda reported, error: reported._replace(distance_m=max(0.0, reported.distance_m + error[0])),
-)
+def shifted(reported: Distance, error: Vector) -> Distance:
+    return reported._replace(distance_m=max(0.0, reported.distance_m + error[0]))

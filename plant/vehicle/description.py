@@ -117,11 +117,8 @@ class Rotors(Table, frozen=True, kw_only=True):
             raise ValueError("idle_speed: must lie below max_speed")
         if not self.strength:
             msgspec.structs.force_setattr(self, "strength", (1.0,) * self.count)
-        for key, given in (
-            ("direction", self.direction),
-            ("axis", self.axis or self.stopped),
-            ("strength", self.strength),
-        ):
+        of_each = {"direction": self.direction, "axis": self.axis or self.stopped, "strength": self.strength}
+        for key, given in of_each.items():
             if len(given) != self.count:
                 raise ValueError(f"{key}: {len(given)} given for the {self.count} rotors of position_m")
         if not all(map(any, self.axis)):

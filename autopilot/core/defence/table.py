@@ -32,9 +32,6 @@ TELEMETRY: Final = "telemetry"
 STATIONS: Final = "ground stations"
 DATAGRAM: Final = "datagram"
 PARAMETERS: Final = "parameters"
-PROGRESS: Final = "progress"
-HUB: Final = "hub"
-LOG: Final = "flight log"
 CHECKPOINT: Final = "checkpoint"
 PROCESS: Final = "process"
 
@@ -59,9 +56,9 @@ PARTS: Final = {
     STATIONS: DefendedPart("not served in this frame"),
     DATAGRAM: DefendedPart("dropped"),
     PARAMETERS: DefendedPart("old values stay"),
-    PROGRESS: DefendedPart("not reported"),
-    HUB: DefendedPart("not polled in this frame"),
-    LOG: DefendedPart("not recorded"),
+    "progress": DefendedPart("not reported"),
+    "hub": DefendedPart("not polled in this frame"),
+    "flight log": DefendedPart("not recorded"),
     CHECKPOINT: DefendedPart("none for a restart", optional=True),
     PROCESS: DefendedPart("left out"),
 }

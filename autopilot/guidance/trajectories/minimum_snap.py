@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from math import factorial, perm
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.common.jit import compiled
@@ -27,12 +26,10 @@ class PiecewisePolynomial:
     coefficients: Array
 
     def __call__(self, t: TaylorSeries) -> tuple[TaylorSeries, ...]:
-        piece = self._piece(t.coefficients[0])
+        after = np.searchsorted(self.times_s, t.coefficients[0], side="right")
+        piece = np.clip(after - 1, 0, len(self.times_s) - 2)
         tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
         return tuple(_horner(self.coefficients[piece, :, axis], tau) for axis in range(self.coefficients.shape[2]))
-
-    def _piece(self, t: Array) -> NDArray[np.intp]:
-        return np.clip(np.searchsorted(self.times_s, t, side="right") - 1, 0, len(self.times_s) - 2)
 
 
 def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
