@@ -46,12 +46,12 @@ class Actuation:
         self._loop, self._rotor_loss = loop, rotor_loss
         self._stopped = loop.vehicle.rotors.stopped
         self.adopt(loop.vehicle)
-        self.by_plain_law = False  # the plain law has replaced the control law
+        self.by_plain_law = False  # whether the plain law has replaced the control law
         self.descent: Descent | None = None  # the last resort, once needed
         self._solving = SolveTime(loop.control_interval_us, self._stopped)
-        self.sent = self._stopped  # parts of the largest speed
+        self.sent = self._stopped  # the last command, parts of the largest speed
         self.decision: Decision | None = None  # None while the rotors stand or idle
-        self.solve_time_s = 0.0  # of the last QP
+        self.solve_time_s = 0.0  # time of the last QP
 
     @property
     def missed(self) -> int:

@@ -27,7 +27,7 @@ Ts = TypeVarTuple("Ts")
 class ControlSample(NamedTuple):
     """A control sample."""
 
-    now_us: int  # of its frame
+    now_us: int  # time of its frame
     state: VehicleState
     guidance: Guidance
     decision: Decision | None  # None while the rotors stand or idle, or an earlier decision is being solved

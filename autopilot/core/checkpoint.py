@@ -33,21 +33,21 @@ Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE
 class Checkpoint(NamedTuple):
     """A flight at one control sample."""
 
-    fingerprint: int  # the memory of another law is not restored
+    fingerprint: int  # hash of profile and vehicle: the memory of another law is not restored
     time_us: int
-    origin: Geodetic  # of the ENU frame
-    plan_ids: tuple[int, ...]  # of mission, geofence and rally points, which are stored separately
+    origin: Geodetic  # origin of the ENU frame
+    plan_ids: tuple[int, ...]  # opaque ids of mission, geofence and rally points, which are stored separately
     mission: MissionRecord
     pilot: PilotRecord
     task: TaskRecord
     loop: LoopRecord
     charge_ah: float  # taken from the battery
     energy_wh: float
-    state_source: bytes  # of the estimator; empty on state feedback
-    rotor_lost: int | None  # index; None if all rotors turn
+    state_source: bytes  # state of the estimator; empty on state feedback
+    rotor_lost: int | None  # index of a lost rotor
     rotor_speeds: Array  # modelled, parts of the largest, (4,)
     failsafes: FailsafeMemory
-    had_station: bool  # the link-loss timer starts at the restart
+    had_station: bool  # whether a ground station was ever connected: the link-loss timer starts at the restart
 
     def is_followed_by(self, time_us: int) -> bool:
         return 0 <= time_us - self.time_us <= FOLLOWS_US

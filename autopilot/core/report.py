@@ -20,7 +20,7 @@ class Reporter:
         self._parts = parts
         self._health = HealthWatch()
         self._interval_s = parts.loop.control_interval_us * 1e-6
-        self.samples = 0  # reported
+        self.samples = 0  # control samples reported so far
 
     def report(self, sample: ControlSample, decision: Decision | None, duration_s: float) -> None:
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations

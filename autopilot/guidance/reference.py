@@ -45,7 +45,7 @@ class Target(NamedTuple):
     motion: Array
     kinds: Kinds  # binding derivative of x, y and z
     heading: Array
-    turns: bool = True  # yaw binds; otherwise its rate
+    turns: bool = True  # whether yaw binds; otherwise its rate
 
 
 def at_rest(state: VehicleState) -> Reference:

@@ -16,7 +16,7 @@ class Air:
         self._gusts = weather.gusts
         self._intensity = weather.turbulence
         self._turbulence = Turbulence(weather.seed)
-        self.steady: Vector | None = None  # ENU, m/s, where it is constant
+        self.steady: Vector | None = None  # velocity, ENU, m/s, where it is constant
         self.blow(weather.wind)
 
     def blow(self, wind: Wind | RecordedWind) -> None:

@@ -32,7 +32,7 @@ _A = np.array(
     ]
 )
 """Weights of the slopes at each stage; the last ones are those of the fifth-order result."""
-_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])  # of orders 5 and 4
+_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])  # order 5 less 4
 _STAGES = 7
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR, _EXPONENT = 0.9, 0.2, 10.0, -0.2
 _TOO_SMALL = 1e-14  # smallest step, in parts of the frame

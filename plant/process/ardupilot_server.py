@@ -41,7 +41,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     return stop.code
 
 
-REPEATED_AFTER_S = 0.5  # time since the last answer after which a request may have come twice
+REPEATED_AFTER_S = 0.5  # time since the last answer after which a request may have come twice: ArduPilot repeats it
 
 
 class ArduPilotServer:

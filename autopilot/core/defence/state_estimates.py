@@ -19,7 +19,7 @@ class StateEstimates:
         self._source, self._defence, self._gravity = source, defence, gravity_m_s2
         self._inertial: InertialEstimate | None = None
         self._missed = 0
-        self.blind = False  # the state comes from the inertial sensors alone, without position
+        self.blind = False  # whether the state comes from the inertial sensors alone, without position
 
     def state(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""

@@ -22,7 +22,7 @@ ACTIVE: int = mav.MISSION_STATE_ACTIVE
 PAUSED: int = mav.MISSION_STATE_PAUSED
 COMPLETE: int = mav.MISSION_STATE_COMPLETE
 
-MAX_ITEMS_A_STEP = 16  # started in a step
+MAX_ITEMS_A_STEP = 16  # most items started in a step
 REST_US = 1_000_000  # delay between jumps without flight between them
 CIRCLING_AFTER = 3  # jumps without flight between them
 _HOLD = Hold()
@@ -64,13 +64,13 @@ class MissionRecord(NamedTuple):
     state: int
     order: OrderRecord
     speed_m_s: float | None
-    jumps: dict[int, int]  # left, by item
+    jumps: dict[int, int]  # remaining jumps, by item
     mission_context: MissionContext | None
     defaults: Defaults
     order_before: OrderRecord
-    phases: int  # left of the item
+    phases: int  # remaining phases of the item
     since_us: int
-    fresh: bool  # the phase began in the last step
+    fresh: bool  # whether the phase began in the last step
     jumped: int  # jumps since the last flight
     rest_until_us: int
 

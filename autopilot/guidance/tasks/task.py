@@ -35,7 +35,7 @@ class TaskContext(NamedTuple):
     steered: ClientInputs = NOT_STEERED
     standing: bool = False
     ground_m: float = 0.0  # z of ENU at the last standing position
-    blind: bool = False  # the position is unusable
+    blind: bool = False  # whether the position is unusable
     home_yaw_rad: float = 0.0
 
     @property

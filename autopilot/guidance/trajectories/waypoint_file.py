@@ -26,7 +26,7 @@ class Waypoints:
     times_s: Array
     points_enu_m: Array
     yaw_rad: Array | None
-    timed: bool  # the file prescribes the times
+    timed: bool  # whether the file prescribes the times
     fastest: bool = False
     margin: float = MARGIN
     openings: Openings | None = None  # what is flown through at the points, with `fastest`

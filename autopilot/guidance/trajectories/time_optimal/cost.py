@@ -22,7 +22,7 @@ from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
 
-_INTERVALS = 8  # samples of a piece
+_INTERVALS = 8  # sampling intervals of a piece
 _STEPS = (1e-6, 1e-6, 1e-5, 1e-4)  # difference steps of velocity, acceleration, jerk and snap
 _ORDERS = np.tile(np.arange(float(SNAP)), 2)
 

@@ -18,7 +18,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position, thro
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array
 
-_PIECES, _LEAST_PIECES, _MOST_PIECES = 8, 32, 1024  # of a leg, and bounds on those of all legs
+_PIECES, _LEAST_PIECES, _MOST_PIECES = 8, 32, 1024  # pieces of a leg, and bounds on those of all legs
 _WEIGHTS = (1e2, 1e4)  # successive weights of the penalty
 _ITERATIONS = 250
 _TOLERANCE, _ROUGH_TOLERANCE = 2e-5, 1e-4  # of the last stage, and before
