@@ -12,7 +12,7 @@ from colibri.common.files import read_bytes
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
-UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)  # nesting is a RecursionError
+UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)  # invalid content, no UTF-8, too deep nesting
 T = TypeVar("T")
 _MOST = 1e12  # products of a few numbers up to there, and quotients, are finite
 

@@ -58,7 +58,7 @@ COPTER_MODES = _named(
     _copter("Smart RTL", 21),
 )
 """https://ardupilot.org/copter/docs/parameters.html, FLTMODE1."""
-MODES: dict[int, dict[str, FlightMode]] = {PX4: PX4_MODES, ARDUPILOT: COPTER_MODES}  # by MAV_AUTOPILOT, name
+MODES: dict[int, dict[str, FlightMode]] = {PX4: PX4_MODES, ARDUPILOT: COPTER_MODES}  # by MAV_AUTOPILOT and name
 
 
 def mode_named(autopilot: int | None, name: str) -> FlightMode | None:

@@ -17,7 +17,7 @@ from colibri.mavlink.telemetry.snapshot import CHARGE_OK, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
-EVERY_US = 40_000  # of attitude, control and motors: 25 Hz, as at ArduCopter's default LOG_BITMASK
+EVERY_US = 40_000  # interval of attitude, control and motors: 25 Hz, as at ArduCopter's default LOG_BITMASK
 SLOW_EVERY_US = 200_000  # interval of position fixes and the battery
 
 _GPS_EPOCH_US = 315_964_800_000_000 - 18_000_000  # Unix time of 1980-01-06, less the leap seconds since
@@ -28,7 +28,7 @@ _BATTERY, _FENCE, _GPS_GLITCH = 6, 9, 11  # subsystems of ERR
 _OUTPUTS = 14
 
 
-_Row: TypeAlias = Callable[[TelemetrySnapshot], tuple[Value, ...]]  # fields without time
+_Row: TypeAlias = Callable[[TelemetrySnapshot], tuple[Value, ...]]  # returns the fields after the time
 
 
 class DataFlashRecorder:

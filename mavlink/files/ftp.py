@@ -36,7 +36,7 @@ CHECKSUM_BYTES_A_POLL = 256 << 10
 
 _UINT32_MAX = 0xFFFFFFFF
 
-Outcome: TypeAlias = bytes | Nak | FileRefusal | None  # `None`: the answer follows later
+Outcome: TypeAlias = bytes | Nak | FileRefusal | None  # `None` if the answer follows later
 
 
 @dataclass(slots=True)

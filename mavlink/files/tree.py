@@ -90,7 +90,7 @@ def reading_of(data: bytes) -> OpenFile:
     return OpenFile(len(data), lambda offset, count: data[offset : offset + count])
 
 
-Generator: TypeAlias = Callable[[str], bytes]  # content by the query behind a question mark: "withdefaults=1"
+Generator: TypeAlias = Callable[[str], bytes]  # returns the content for a query, the text behind a question mark
 
 
 class Tree:

@@ -28,7 +28,7 @@ _FIELDS = (
     "abs_pressure diff_pressure pressure_alt temperature fields_updated"
 )
 _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
-_SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]  # without zero bytes
+_SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]  # `fields_updated` of 1, 2 bytes
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *_SHORTENED)}
 _SINGLES = Struct("<11f")
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")

@@ -8,7 +8,7 @@ from typing import Protocol
 from colibri.common.types import Address
 from colibri.mavlink.errors import MavlinkError
 
-SPIN_S = 1e-3  # polled for so long before sleeping, if the previous wait was as short: a wake-up costs more
+SPIN_S = 1e-3  # time to poll before sleeping, if the previous wait was as short: a wake-up costs more
 give_way = getattr(os, "sched_yield", lambda: None)
 
 

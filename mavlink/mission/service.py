@@ -219,13 +219,9 @@ class MissionService:
     def _item(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if fields.current >= GUIDED and not self._uploads.expects(peer, fields.mission_type):
-            return self._guided(message, peer)
+            result, reason = self._fly_to(message)
+            return [ack(peer, result, fields.mission_type), *(self._text.say(WARNING, reason) if reason else ())]
         return self._explained([self._uploads.item(message, peer, now_us)])
-
-    def _guided(self, message: Message, peer: Peer) -> Iterable[Send]:
-        result, reason = self._fly_to(message)
-        text = self._text.say(WARNING, reason) if reason else []
-        return [ack(peer, result, message.fields.mission_type), *text]
 
     def _fly_to(self, message: Message) -> tuple[int, str]:
         fields = message.fields

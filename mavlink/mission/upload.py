@@ -18,9 +18,9 @@ from colibri.mavlink.wire.dialect import Message, mav
 
 ASK_EVERY_US = 250_000
 PATIENCE_US = 5_000_000
-GIVES_WAY_AFTER_US = 20_000_000  # to another station's: one that repeats itself must not keep others out
+GIVES_WAY_AFTER_US = 20_000_000  # then another station may upload: one that repeats itself must not keep others out
 OLD_FORM_AFTER = 2  # unanswered requests before every other one is the old MISSION_REQUEST
-ANSWER_AGAIN_AFTER_US = 200_000  # an earlier copy of the last item is a link's duplicate
+ANSWER_AGAIN_AFTER_US = 200_000  # an earlier copy of the last item is a link's duplicate, a later one was sent again
 NEVER_US = 2**63
 
 

@@ -12,14 +12,14 @@ from colibri.mavlink.node.service import IDLE, Peer, PolledService, Send, Servic
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import TOO_EARLY, Signing
 
-CHANNELS = 32  # of those that are not fixed, the longest silent or else the newest one is replaced
+CHANNELS = 32  # limit: the longest silent or else the newest one that is not fixed is replaced
 SILENT_AFTER_US = 3_500_000  # stations send a HEARTBEAT every second, so no flood replaces them
 FORGET_AFTER_US = 300_000_000  # silence before an unfixed channel is closed: sending to it costs time
 _TIDY_EVERY_US = 1_000_000
 _OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})  # messages without a verifiable CRC or signature
 
 
-_HANDLED_US, _ANSWERED_US = 20.0, 8.0  # work for a message to a service, and for each sent in answer
+_HANDLED_US, _ANSWERED_US = 20.0, 8.0  # work for a message that a service handles, and for each one sent in answer
 MAX_WAITING = 1000  # limit of messages of one channel that wait for the budget; more are dropped
 _TRIES = 3  # exceptions in `poll` before a service is switched off
 Caught: TypeAlias = Callable[[str, Exception, str], None]  # (service, exception, consequence)

@@ -34,7 +34,7 @@ class Send(NamedTuple):
     channel: int | None = None  # `None` for all
 
 
-IDLE: Final[Sequence[Send]] = []  # of a service that is not polled again before it receives a message
+IDLE: Final[Sequence[Send]] = []  # result of a service that is not polled again before it receives a message
 
 
 class Service(Protocol):

@@ -18,9 +18,9 @@ FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 UNSUPPORTED_MAV_FRAME = 9  # MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects
 
-_SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}  # of others: warnings; stations ask for unsupported ones by themselves
+_SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}  # others are warnings; ground stations ask for unsupported commands
 
-PENDING = Refusal(result=-1)  # takes a few frames: `finish` sends the answer
+PENDING = Refusal(result=-1)  # the command takes a few frames: `finish` sends the answer
 
 PROGRESS_UNKNOWN = 0xFF  # COMMAND_ACK.progress of a pending command
 NOT_GIVEN = 2**31 - 1  # the integer x and y of a COMMAND_INT for nan in a COMMAND_LONG

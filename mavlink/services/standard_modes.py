@@ -22,7 +22,7 @@ class ModeInfo(NamedTuple):
     advanced: bool = False  # "harder to fly"
 
 
-SetMode: TypeAlias = Callable[[int, ReceivedCommand], Refusal | None]  # (custom mode, command)
+SetMode: TypeAlias = Callable[[int, ReceivedCommand], Refusal | None]  # takes a custom mode
 
 
 class StandardModes:

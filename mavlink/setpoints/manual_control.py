@@ -16,7 +16,7 @@ from colibri.mavlink.wire.dialect import Message
 FULL = 1000
 UNUSED = 0x7FFF  # INT16_MAX: a missing axis; its stick is centred
 
-RELEASED, UNCHANGED = 0, 0xFFFF  # of channels 1 to 8: back to the radio, or left
+RELEASED, UNCHANGED = 0, 0xFFFF  # of channels 1 to 8: returned to the radio, or left as they are
 MIN_US, MIDDLE_US, MAX_US = 1000, 1500, 2000
 VALID_US = (800, 2200)  # transmitters exceed 1000 and 2000 µs; values beyond count as full
 _ALL_RELEASED = (RELEASED, RELEASED, RELEASED, RELEASED)

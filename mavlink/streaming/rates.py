@@ -63,7 +63,7 @@ def _intervals(column: int) -> dict[str, int]:
     return {name: round(HZ / rates[column]) for name, rates in _RATES_HZ.items() if rates[column]}
 
 
-DEFAULTS: dict[str, dict[str, int]] = {SDK: _intervals(0), GCS: _intervals(1), SILENT: {}}  # µs, by channel
+DEFAULTS: dict[str, dict[str, int]] = {SDK: _intervals(0), GCS: _intervals(1), SILENT: {}}  # intervals, µs
 
 GROUPS: dict[int, tuple[str, ...]] = {
     1: ("RAW_IMU", "SCALED_IMU", "SCALED_PRESSURE", "HIGHRES_IMU"),

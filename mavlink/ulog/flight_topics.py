@@ -113,7 +113,7 @@ DECISION = Topic(
         Columns("qp_iterations", "", "iterations of the QP solver, or `nan`", "float"),
     ),
 )
-MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")  # as in `FILTER`
+MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")  # in the order of `FILTER`
 ESTIMATE = Topic(
     *("colibri_estimate", 103, "estimate.csv", "a control sample on sensors: the estimate"),
     columns=(

@@ -20,7 +20,7 @@ def message(kind: str, content: bytes) -> bytes:
     return _HEAD.pack(len(content), ord(kind)) + content
 
 
-SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))  # mark after unreadable bytes
+SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))  # readers find it after unreadable bytes
 
 
 def header() -> bytes:

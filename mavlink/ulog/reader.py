@@ -66,7 +66,8 @@ class FlightFile:
             head = log[at : at + messages.HEAD_BYTES + 2]
             size = int.from_bytes(head[:2], "little") + messages.HEAD_BYTES
             if head[2] not in _KINDS or at + size > end:
-                at = self._next_mark(at + 1)
+                found = log.find(messages.SYNC, at + 1)
+                at = end if found < 0 else found
                 continue
             count = 1
             if head[2] == messages.DATA:
@@ -98,7 +99,3 @@ class FlightFile:
     def _release(self) -> None:
         if isinstance(self._log, mmap):
             self._log.madvise(MADV_DONTNEED)
-
-    def _next_mark(self, at: int) -> int:
-        found = self._log.find(messages.SYNC, at)
-        return self._size if found < 0 else found
