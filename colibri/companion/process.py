@@ -23,10 +23,9 @@ from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
-from colibri.companion.response_file import read_response
 from colibri.companion.setpoints import FlightSummary, LogRow
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stack import STACKS
+from colibri.companion.stack import STACKS, read_response
 from colibri.companion.steering.references import stay_of
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits

@@ -19,7 +19,7 @@ from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.service import MAX_STREAMED
 from colibri.mavlink.wire.dialect import mav
 from tools.frames.requests import REQUESTS, Sender, in_the_air
-from tools.fuzz.flight import BareFlight
+from tools.fuzz.vehicle import BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 ALL_ARE_USED = """
@@ -31,7 +31,7 @@ from colibri.autopilot.control.qp import Qp, QpSolver
 from colibri.mavlink.files.folder import Folder
 from tools.frames.__main__ import Timed
 from tools.frames.requests import REQUESTS
-from tools.fuzz.flight import BareFlight
+from tools.fuzz.vehicle import BareFlight
 
 with TemporaryDirectory() as folder:
     flight = BareFlight(files=Folder(Path(folder)))

@@ -11,8 +11,7 @@ from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
 from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
-from tools.fuzz.flight import BareFlight
-from tools.fuzz.vehicle import HIGH
+from tools.fuzz.vehicle import HIGH, BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 TO = (SYSTEM, COMPONENT)

@@ -15,8 +15,8 @@ from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.wire.dialect import Codec
 from tools.fuzz.datagrams import ACTUATORS, ATTITUDE, AUTOPILOT, FRAME_US, PLANT, Fuzzer
 from tools.fuzz.vehicle import ground_campaign
+from tools.harness.ports import Relay
 from tools.harness.processes import Process, fly_thesis, running, start_autopilot, start_plant, states
-from tools.harness.relay import Relay
 
 UNREADABLE = ("malformed", "unknown", "truncated")
 """Counts of a codec that depend on the datagram alone."""

@@ -1,6 +1,8 @@
-"""UDP ports for clients without I/O."""
+"""UDP ports for clients without I/O, and relays that damage the traffic."""
 
+import random
 import socket
+from abc import ABC, abstractmethod
 from select import select
 from threading import Event, Thread
 from time import monotonic
@@ -53,3 +55,76 @@ class OnPort:
                 datagram, self.sender = self._socket.recvfrom(4096)
                 for answer in self._talker.receive(datagram, monotonic()):
                     self.send(answer)
+
+
+LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
+"""Parts of the datagrams on a `BadLink`."""
+
+
+class Relay(ABC):
+    """Stands between a plant and an autopilot, which calls `url`."""
+
+    def __init__(self, plant_url: str) -> None:
+        _, host, port = plant_url.split(":")
+        self._plant = (host, int(port))
+        self._near, self.url = bound_socket()
+        self._far, _ = bound_socket()
+        self._autopilot: tuple[str, int] | None = None
+        self._ended = Event()
+        self._thread = Thread(target=self._run, daemon=True)
+
+    @abstractmethod
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        """Handle a datagram for `plant` or `autopilot`."""
+
+    def deliver(self, to: str, datagram: bytes) -> None:
+        if to == "plant":
+            self._far.sendto(datagram, self._plant)
+        elif self._autopilot:
+            self._near.sendto(datagram, self._autopilot)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._near.close()
+        self._far.close()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            for sock in select([self._near, self._far], [], [], 0.05)[0]:
+                datagram, sender = sock.recvfrom(4096)
+                if sock is self._near:
+                    self._autopilot = sender
+                    self.pass_on("plant", datagram)
+                else:
+                    self.pass_on("autopilot", datagram)
+
+
+class BadLink(Relay):
+    """A relay like a bad radio link, both ways."""
+
+    def __init__(self, plant_url: str, seed: int) -> None:
+        super().__init__(plant_url)
+        self._chance = random.Random(seed)
+        self._held: dict[str, bytes] = {}
+        self.counts = {"passed": 0, "lost": 0, "duplicated": 0, "reordered": 0}
+
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        fate = self._chance.random()
+        if fate < LOSS:
+            self.counts["lost"] += 1
+        elif fate < LOSS + REORDERING and to not in self._held:
+            self.counts["reordered"] += 1
+            self._held[to] = datagram
+        else:
+            self.counts["passed"] += 1
+            self.deliver(to, datagram)
+            if fate > 1.0 - DUPLICATION:
+                self.counts["duplicated"] += 1
+                self.deliver(to, datagram)
+            if to in self._held:
+                self.deliver(to, self._held.pop(to))

@@ -10,7 +10,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench import commands, run, sensing, serving, simulators, speed, stages
+from colibri.bench import commands, costs, run, simulators, speed, stages
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -79,20 +79,20 @@ def test_whole_commands_alternate_with_another_checkout(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_the_cost_of_serving_stations_is_measured(tmp_path: Path) -> None:
     ground = figures_of(tmp_path / "ground.json", "--only", "ground")["ground"]
-    assert {int(channels) for channels in ground["serve"]} == set(serving.CHANNELS)
+    assert {int(channels) for channels in ground["serve"]} == set(costs.CHANNELS)
     rates = [figure["messages_hz"] for figure in ground["serve"].values()]
     assert rates[0] == 0.0
     assert rates == sorted(set(rates))
     assert all(0.0 < figure["p50"] <= figure["p99"] for figure in ground["serve"].values())
     steps = ground["control_step_us"]
-    assert set(steps) == {serving.ALONE, serving.WATCHED}
+    assert set(steps) == {costs.ALONE, costs.WATCHED}
     assert {figure["samples"] for figure in steps.values()} == {24}
 
 
 @pytest.mark.long
 def test_the_estimator_and_sensor_flights_are_timed(tmp_path: Path) -> None:
     sensors = figures_of(tmp_path / "sensors.json", "--only", "sensors")["sensors"]
-    assert set(sensors["estimator_us"]) == {sensing.ALWAYS, sensing.IN_FLIGHT}
+    assert set(sensors["estimator_us"]) == {costs.ALWAYS, costs.IN_FLIGHT}
     assert all(0.0 < figure["p50"] <= figure["p99"] for figure in sensors["estimator_us"].values())
     assert {figure["samples"] for figure in sensors["estimator_us"].values()} == {500}
     assert set(sensors["real_time_factor"]) == {"memory, state", "memory, sensors", "udp, state", "udp, sensors"}

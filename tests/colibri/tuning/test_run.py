@@ -6,9 +6,8 @@ import pytest
 
 import colibri
 from colibri.campaigns.flights import Verdict
-from colibri.tuning.flying import TrialFlights
 from colibri.tuning.results import TuningResults
-from colibri.tuning.run import fly_tuning
+from colibri.tuning.run import TrialFlights, fly_tuning
 from tests.support.campaigns import Here, tables_in
 from tests.support.commands import Refused
 from tests.support.tuning import FILE, POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned

@@ -16,8 +16,8 @@ from time import perf_counter, sleep
 from colibri.analysis.recording import read_recording
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
+from tools.harness.ports import Relay
 from tools.harness.processes import Process, running
-from tools.harness.relay import Relay
 from tools.pages.latency import LEMNISCATE, STEP, LatencyCase, merit
 
 _LOOK_EVERY_S = 0.0002

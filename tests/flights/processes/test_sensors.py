@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from colibri.common.process.lifecycle import nudge_m
+from tools.harness.ports import BadLink
 from tools.harness.processes import Process, fly, running, start_autopilot, start_plant, states, topic_rows
-from tools.harness.relay import BadLink
 
 ON_SENSORS = ("spiral", "--feedback", "sensors")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from colibri.autopilot.estimation.estimator import Estimator
-from colibri.bench.sensing import sensor_frames
+from colibri.bench.costs import sensor_frames
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.types import Array
 from colibri.mavlink.ulog import messages

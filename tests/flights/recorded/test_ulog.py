@@ -15,7 +15,7 @@ from pyulog import ULog, info, messages, params, ulog2csv
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.bench.sensing import sensor_frames
+from colibri.bench.costs import sensor_frames
 from colibri.cli.main import main
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.ulog.blocks import EVERY_US
