@@ -4,7 +4,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from hashlib import sha256
-from math import cos, sin
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -18,6 +17,8 @@ from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, read_toml
 from colibri.common.errors import shown
 from colibri.common.files import read_bytes
+from colibri.common.kernels import cos, sin
+from colibri.common.matrices import matmul, matvec
 from colibri.common.rotations import earth_from_body, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -104,9 +105,9 @@ class PolicyLaw(ABC):
         c, s = cos(0.5 * memory.heading_rad), -sin(0.5 * memory.heading_rad)  # it has learned to head east
         east = np.array(rotation_matrix((c, 0.0, 0.0, s)))
         w, i, j, k = x[9:]
-        x[6:9] = east @ x[6:9]
+        x[6:9] = matvec(east, x[6:9])
         x[9:] = c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w
-        observe(x, last, older, references.position_enu_m @ east.T, 0, 1, seen)
+        observe(x, last, older, matmul(references.position_enu_m, east.T), 0, 1, seen)
         given = self.act(seen)
         action = np.asarray(given, dtype=np.float64)
         if action.shape != last.shape or take(action, last, older) < 0.0:

@@ -4,7 +4,7 @@ Each angle is slewed with bounded rate and acceleration. The thrust direction is
 the reached yaw. Body rates are integrated by THESIS [2.7].
 """
 
-from math import cos, isnan, nan, radians
+from math import isnan, nan, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Attit
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.elementary import square
+from colibri.common.kernels import cos
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks

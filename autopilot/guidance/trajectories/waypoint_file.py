@@ -8,6 +8,7 @@ import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFileError, read_table
 from colibri.autopilot.guidance.trajectories.openings import Openings
+from colibri.common import elementwise
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
@@ -84,7 +85,7 @@ def _with_windows(waypoints: Waypoints, table: CsvTable) -> Waypoints:
     for row, column in np.argwhere(sizes < 0.0)[:1]:
         raise table.error(row, _WINDOW[column], f"must be at least 0 m, not {sizes[row, column]:g}")
     facing = np.radians(table.values["facing"])
-    ahead = np.stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))], axis=1)
+    ahead = np.stack([elementwise.cos(facing), elementwise.sin(facing), np.zeros(len(facing))], axis=1)
     axes = np.zeros((len(facing), 3, 3))
     half = 0.5 * (1.0 - waypoints.margin) * sizes
     axes[:, 0, 0], axes[:, 1, 0], axes[:, 2, 1] = -half[:, 0] * ahead[:, 1], half[:, 0] * ahead[:, 0], half[:, 1]
