@@ -61,8 +61,8 @@ def gust(text: str) -> Gust:
     return Gust(peak, start_s, duration_s)
 
 
-def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
-    lines = (read_given(path, ArgumentTypeError) if text is None else text).splitlines()
+def recorded_wind(path: Path) -> RecordedWind:
+    lines = read_given(path, ArgumentTypeError).splitlines()
     if not lines or lines[0].replace(" ", "") != COLUMNS:
         raise ArgumentTypeError(f"{path}: line 1: must be {COLUMNS}")
     rows = [_row(path, i, line) for i, line in enumerate(lines[1:], start=2) if line.strip()]

@@ -49,11 +49,8 @@ class Checkpoint(NamedTuple):
     failsafes: FailsafeMemory
     had_station: bool  # whether a ground station was ever connected: the link-loss timer starts at the restart
 
-    def is_followed_by(self, time_us: int) -> bool:
-        return 0 <= time_us - self.time_us <= FOLLOWS_US
-
-    def is_close_to(self, time_us: int) -> bool:
-        return 0 <= time_us - self.time_us <= CLOSE_US
+    def is_followed_by(self, time_us: int, within_us: int = FOLLOWS_US) -> bool:
+        return 0 <= time_us - self.time_us <= within_us
 
 
 class History(NamedTuple):
@@ -99,7 +96,7 @@ class Checkpointer:
         """Restore every part but the state source, which comes before, at the first frame after a restart."""
         checkpoint, plans = history
         parts, stations, pilot = self._parts, self._parts.stations, self._parts.pilot
-        seamless = checkpoint.is_close_to(frame.time_us) and checkpoint.fingerprint == self._fingerprint
+        seamless = checkpoint.fingerprint == self._fingerprint and checkpoint.is_followed_by(frame.time_us, CLOSE_US)
         parts.loop.resume(checkpoint.loop, seamless=seamless)
         parts.battery.resume(checkpoint.charge_ah, checkpoint.energy_wh)
         pilot.home.move_origin(checkpoint.origin)

@@ -173,8 +173,9 @@ class Copter:
         if self.parameters.proposed and (self.parts.budget.allows(now_us) or now_us >= self._settles_by_us):
             self._settles_by_us = now_us + _SETTLES_WITHIN_US
             self.guard(table.PARAMETERS, self.parameters.settle, table.nothing)
-        if self.parameters.revision != self.parts.subscribers.revision:
-            self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
+        subscribers = self.parts.subscribers
+        if self.parameters.revision != subscribers.revision:
+            self.guard(table.PARAMETERS, subscribers.adopt, lambda: subscribers.keep(self.parameters), self.parameters)
         return self.stations.poll(now_us)
 
     def record(self) -> Checkpoint | None:
@@ -182,9 +183,6 @@ class Copter:
         if now_us is None:
             return None
         return self.guard(table.CHECKPOINT, lambda: self._checkpointer.record(now_us), lambda: None)
-
-    def _keep_parameters(self) -> None:
-        self.parts.subscribers.keep(self.parameters)
 
     def _report(self) -> None:
         sampled, self._sampled = self._sampled, None

@@ -36,7 +36,7 @@ class Flying:
         euler = euler_from_quaternion(known.attitude)
         state = VehicleState(known.position_enu_m, known.velocity_enu_m_s, known.attitude, euler, known.rate_flu_rad_s)
         actuation = self._parts.actuation
-        return self._guard(table.PLAIN_LAW, lambda: actuation.decide_plainly(now_us, state, RESTS), lambda: None)
+        return self._guard(table.PLAIN_LAW, actuation.decide_plainly, lambda: None, now_us, state, RESTS)
 
     def descend(self, now_us: int) -> None:
         """Fly the last resort for good."""
@@ -100,10 +100,7 @@ class Flying:
     def _decide_plainly(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         actuation, pilot = self._parts.actuation, self._parts.pilot
 
-        def plainly() -> Decision | None:
-            return actuation.decide_plainly(now_us, state, guidance)
-
-        decision = self._guard(table.PLAIN_LAW, plainly, lambda: None)
+        decision = self._guard(table.PLAIN_LAW, actuation.decide_plainly, lambda: None, now_us, state, guidance)
         if actuation.descent is not None and actuation.descent.landed and pilot.state.armed:
             pilot.touch_down()
         return decision

@@ -1,6 +1,7 @@
 """The step of an autopilot, and the answer to a datagram of the plant."""
 
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple
 
 from colibri.autopilot.control.interface import Decision, Horizon
 from colibri.autopilot.estimation.estimate import Estimate
@@ -30,20 +31,16 @@ class Step(NamedTuple):
     references: Horizon | None = None
 
 
-class Steps(Protocol):
-    """An autopilot."""
-
-    def step(self, frame: Frame, plant_status: PlantStatus) -> Step: ...
-
-
-def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_s: float) -> Step | None:
+def answer(
+    end: AutopilotEnd | FlierEnd, step: Callable[[Frame, PlantStatus], Step], datagram: bytes, now_s: float
+) -> Step | None:
     """Answer a plant's datagram; None if it contains no frame, DecisionError beyond the limits of the rotors."""
     received = end.receive(datagram, now_s)
     if received is None:
         return None
-    step = autopilot.step(*received)
-    end.answer(step.command, step.faults)
-    return step
+    answered = step(*received)
+    end.answer(answered.command, answered.faults)
+    return answered
 
 
 class Received(NamedTuple):

@@ -77,10 +77,10 @@ class AttitudeReference:
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self.max_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
-    def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
+    def initial(self, state: VehicleState) -> ReferenceMemory:
         angles, rates = np.array(state.euler), np.zeros(3)
         limit_tilt(angles, rates, self.limits.slew.max_tilt_rad)
-        return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
+        return ReferenceMemory(angles, rates, self.weight_n)
 
     def step(
         self, memory: ReferenceMemory, state: VehicleState, command: AttitudeCommand

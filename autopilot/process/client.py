@@ -62,7 +62,7 @@ class PlantClient:
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            step = answer(self._end, autopilot, received[0], perf_counter()) if received else None
+            step = answer(self._end, autopilot.step, received[0], perf_counter()) if received else None
             self._send()
             due_s = self._end.poll(perf_counter())
             self._send()

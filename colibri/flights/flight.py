@@ -160,7 +160,7 @@ class InMemory:
             self._traffic(now_us, [frame for outgoing in sent for frame in outgoing.frames])
         step, datagram = None, b""
         for datagram in self.carried_up([outgoing.datagram for outgoing in sent]):
-            step = answer(self.autopilot_end, autopilot, datagram, NEVER_LATE_S) or step
+            step = answer(self.autopilot_end, autopilot.step, datagram, NEVER_LATE_S) or step
         return step, datagram
 
     def _to_plant(self, now_us: int) -> ActuatorCommand | None:

@@ -25,7 +25,7 @@ class PositionTask(EndlessTask):
     def update(self, context: TaskContext) -> PositionMotion:
         sticks, place, velocity = context.steered.sticks or _MIDDLE, context.place, context.velocity
         moves, climbs = stick_velocity(sticks, context), stick_climb(sticks, context)
-        turns = stick_yaw_rate(sticks, context)
+        turns = -dead(sticks.yaw) * context.behaviour.stick_yaw_rate_rad_s
         slowly_turning = abs(float(context.reference.heading[1])) < _SLOW_RAD_S
         self._xy = kept(self._xy, place[:2], moves == (0.0, 0.0), hypot(*velocity[:2]) < _SLOW_M_S)
         self._z = kept(self._z, place[2], climbs == 0.0, abs(velocity[2]) < _SLOW_M_S)
@@ -63,10 +63,6 @@ def stick_climb(sticks: Sticks, context: TaskContext) -> float:
     if up > 0.0:
         return up * (behaviour.stick_climb_m_s or behaviour.limits.climb_m_s)
     return up * (behaviour.stick_sink_m_s or behaviour.limits.sink_m_s)
-
-
-def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:
-    return -dead(sticks.yaw) * context.behaviour.stick_yaw_rate_rad_s
 
 
 def without_play(sticks: Sticks) -> Sticks:

@@ -118,7 +118,7 @@ class MemoryAutopilot:
 
     def receive(self, datagram: bytes) -> None:
         try:
-            answer(self._end, self.autopilot, datagram, NEVER_LATE_S)
+            answer(self._end, self.autopilot.step, datagram, NEVER_LATE_S)
         except DecisionError as error:
             raise SessionError(f"the autopilot ended: {error}") from error
 

@@ -155,7 +155,7 @@ def test_yaw_does_not_run_away_from_a_vehicle_that_cannot_turn() -> None:
 
 
 def test_thrust_is_slewed_and_may_carry_the_weight() -> None:
-    memory = REFERENCE.initial(LEVEL, 3.0)
+    memory = REFERENCE.initial(LEVEL)._replace(thrust_n=3.0)
     _, demand = REFERENCE.step(memory, LEVEL, tilt_command(0.0, 0.0, 0.0, 19.0))
     assert demand.thrust_n[:2] == pytest.approx([3.0, 3.0 + SLEW.thrust_rate_n_s * INTERVAL_S])
     assert demand.thrust_n.max() == 19.0
@@ -225,7 +225,7 @@ def test_any_attitude_is_reached_if_tilt_is_free(angles: tuple[float, float, flo
 
 
 def test_it_begins_where_the_vehicle_is() -> None:
-    memory = REFERENCE.initial(turned(0.2, -0.3, 7.0), 8.0)
+    memory = REFERENCE.initial(turned(0.2, -0.3, 7.0))._replace(thrust_n=8.0)
     assert memory.angles == pytest.approx([0.2, -0.3, 7.0])
     assert memory.thrust_n == 8.0
     steep = REFERENCE.initial(turned(radians(170.0), 0.0, 1.0))
