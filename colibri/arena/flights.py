@@ -12,7 +12,7 @@ from colibri.autopilot.guidance.trajectories.loading import file_of, with_file
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, position
 from colibri.campaigns.factors import CampaignError
-from colibri.common.config import Positive, Table, read_named, toml_names
+from colibri.common.config import Positive, Table, read_named
 from colibri.common.errors import unknown
 from colibri.plant.spec import Part
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -134,7 +134,3 @@ class Arena:
         if beside.is_file():
             text = with_file(text, beside)
         return text, track(text)
-
-
-def set_names() -> list[str]:
-    return [name for name in toml_names(_FOLDER) if not name.startswith(("rotors-", "foehn-"))]

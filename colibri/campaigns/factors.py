@@ -35,19 +35,14 @@ class Uniform(NamedTuple):
         return self
 
 
-class LogUniform(NamedTuple):
+class LogUniform(Uniform):
     """Log-uniform between `low` and `high`, both positive."""
 
-    low: float
-    high: float
+    __slots__ = ()
 
     def value(self, chance: Generator) -> float:
         low, high = elementary.log(self.low), elementary.log(self.high)
         return min(max(elementary.exp(low + (high - low) * float(chance.random())), self.low), self.high)
-
-    @property
-    def typical(self) -> tuple[float, ...]:
-        return self
 
 
 class Normal(NamedTuple):
@@ -76,7 +71,7 @@ class Choice(NamedTuple):
         return self.values
 
 
-Draw: TypeAlias = Uniform | LogUniform | Normal | Choice
+Draw: TypeAlias = Uniform | Normal | Choice
 """A distribution, reproducible on every computer; `typical` values test a factor: the ends, or mean ± one deviation."""
 _PAIRS: dict[str, Any] = {"uniform": Uniform, "log-uniform": LogUniform, "normal": Normal}
 _PLAIN = (str, int, float, Mapping, list, tuple)

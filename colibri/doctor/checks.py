@@ -71,10 +71,8 @@ def lock() -> Finding | None:
     pinned = _here(map(Requirement, _PINNED.findall(path.read_text(encoding="utf-8"))))
     others = [words for pin in pinned if version_of(pin.name) is not None and (words := _wrong(pin))]
     if others:
-        more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
-        return Finding(
-            "lock", Severity.NOTE, ", ".join(others[:_SHOWN]) + more, "make clean setup: as they were tested"
-        )
+        said = ", ".join(others[:_SHOWN]) + (f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else "")
+        return Finding("lock", Severity.NOTE, said, "make clean setup: as they were tested")
     return Finding("lock", Severity.FINE, f"no other version than {_LOCK} names")
 
 
@@ -169,18 +167,12 @@ def loopback() -> Finding:
 
 
 def ports() -> Iterator[Finding]:
-    for port, whose, ours in (
-        (GROUND_PORT, "ground station", False),
-        (SDK_PORT, "SDK", False),
-        (PLANT_PORT, "plant", True),
-    ):
-        who = _who_has(port)
-        checked = f"port {port}, {whose}"
+    for port, whose in ((GROUND_PORT, "ground station"), (SDK_PORT, "SDK"), (PLANT_PORT, "plant")):
+        who, ours, checked = _who_has(port), whose == "plant", f"port {port}, {whose}"
         if who is None:
             yield Finding(checked, Severity.FINE, "free" if ours else "free: start the program at any time")
         elif ours:
-            advice = "end that, or colibri sitl --plant-port 0"
-            yield Finding(checked, Severity.FAILED, f"taken by {who}", advice)
+            yield Finding(checked, Severity.FAILED, f"taken by {who}", "end that, or colibri sitl --plant-port 0")
         else:
             yield Finding(checked, Severity.FINE, f"{who} is listening: the autopilot will connect")
 

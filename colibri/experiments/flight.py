@@ -1,5 +1,6 @@
 """`colibri.fly`: fly from Python."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@dataclass(eq=False)
 class Flight:
     """A finished flight in memory.
 
@@ -38,10 +40,9 @@ class Flight:
         log: The topics of its log.
     """
 
-    def __init__(self, plan: FlightPlan, report: Report, log: TopicReader) -> None:
-        self.plan = plan
-        self.report = report
-        self.log = log
+    plan: FlightPlan
+    report: Report
+    log: TopicReader
 
     @property
     def sha256(self) -> str:

@@ -16,7 +16,6 @@ _FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real"
 """Columns by priority, for a narrow terminal."""
 _LINKS_WIDTH = 66
 """Below this width, links are shown without scheme and rates."""
-_LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "right", "right")
 
 
 class StatusLines:
@@ -69,8 +68,8 @@ def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
         side: Literal["left", "right"] = "left" if heading in ("mode", "rotors") else "right"
         vehicles.add_column(heading, no_wrap=True, min_width=_COLUMNS[heading], justify=side)
     links = Table(box=None, padding=(0, 2, 0, 0), show_header=False, style="dim")
-    for side in _LINK_SIDES:
-        links.add_column(no_wrap=True, justify=side)
+    for column in range(5):
+        links.add_column(no_wrap=True, justify="left" if column in (1, 2) else "right")
     for instance, fact in sorted(facts.items()):
         system = str(instance + 1)
         texts = dict(zip(_COLUMNS, (system, *_vehicle_texts(fact)), strict=True))

@@ -10,15 +10,17 @@ import pytest
 
 import colibri
 from colibri.arena import run
-from colibri.arena.flights import Arena, Row, set_names
+from colibri.arena.flights import Arena, Row
 from colibri.arena.results import ArenaResults
 from colibri.arena.run import laws_of, planned_of
 from colibri.campaigns.flights import FlightResult, Verdict, check, common_of
+from colibri.common.config import toml_names
 from colibri.plant.vehicle.description import vehicle_text
 from tests.support.campaigns import Here
 from tests.support.commands import Refused
 from tests.support.pages import ROOT
 
+SETS = [name for name in toml_names(Path(run.__file__).parent / "sets") if not name.startswith(("rotors-", "foehn-"))]
 LAW = """
 import numpy as np
 import colibri
@@ -67,7 +69,7 @@ def test_the_race_has_25_cells() -> None:
     assert np.hypot.reduce([first[axis] - second[axis] for axis in "xyz"]) == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize("name", set_names())
+@pytest.mark.parametrize("name", SETS)
 def test_flights_of_a_set_can_begin(name: str) -> None:
     planned = planned_of(name, laws_of(["se3"]), 1)
     assert check([next(planned.points())], common_of(planned)) == []
