@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 from typing import Any, NamedTuple, TypeAlias
 
@@ -12,6 +13,7 @@ from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.common import elementary
 from colibri.common.config import value_at
 from colibri.common.errors import Error, unknown
+from colibri.common.process.arguments import number
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle, VehicleError
@@ -113,8 +115,9 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
     if isinstance(given, Mapping):
         name, span = _only(key, given, _SPANS)
         return _span(key, name, span)
-    if isinstance(given, str) and given.count(":") == 2 and all(map(_reads_as_number, given.split(":"))):
-        return _span(key, "linspace", [float(part) for part in given.split(":")])
+    if isinstance(given, str) and given.count(":") == 2:
+        with suppress(ValueError):  # else it is a name
+            return _span(key, "linspace", list(map(number, given.split(":"))))
     if isinstance(given, range) and len(given[: _MAX_SPAN + 1]) > _MAX_SPAN:
         raise CampaignError(f"{key}: at most {_MAX_SPAN} values, not {given}")
     several = isinstance(given, list | tuple | range) and not hasattr(given, "_fields")
@@ -176,13 +179,6 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
 
 def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-
-
-def _reads_as_number(text: str) -> bool:
-    try:
-        return isfinite(float(text))
-    except ValueError:
-        return False
 
 
 SCALED = "*"

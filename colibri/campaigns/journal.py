@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from hashlib import sha256
 from importlib.metadata import version
 from inspect import getsource
 from pathlib import Path
@@ -17,6 +16,7 @@ from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flights import Common, FlightResult
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes, regular
+from colibri.flights.provenance import content_hash
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
@@ -106,8 +106,8 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
         "fly": {name: shown(value) for name, value in campaign.fly.items()},
         "grid": {name: list(map(shown, values)) for name, values in campaign.grid.items()},
         "draw": {name: [type(draw).__name__, repr(draw)] for name, draw in campaign.draw.items()},
-        "contents": {name: _hash(content) for name, content in contents.items() if content},
-        "objects": _hash(_plain([campaign.fly, campaign.grid])),
+        "contents": {name: content_hash(content) for name, content in contents.items() if content},
+        "objects": content_hash(_plain([campaign.fly, campaign.grid])),
     }
 
 
@@ -124,10 +124,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
     return value if isinstance(value, msgspec.Struct | str | int | float | None) else shown(value)
-
-
-def _hash(content: Any) -> str:
-    return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
 
 
 def read_journal(path: Path) -> list[FlightResult]:

@@ -71,8 +71,10 @@ def provenance_of(plan: FlightPlan) -> Provenance:
         "track": with_file(str(plan.spec.track), Path()),
     }
     colibri = version("colibri-sitl")
-    hashes = {name: _hash(content) for name, content in (contents | nameless).items() if content is not None}
-    return Provenance(colibri=colibri, spec=values, sha256={**hashes, "all": _hash([colibri, hashes])}, **contents)
+    hashes = {name: content_hash(content) for name, content in (contents | nameless).items() if content is not None}
+    return Provenance(
+        colibri=colibri, spec=values, sha256={**hashes, "all": content_hash([colibri, hashes])}, **contents
+    )
 
 
 def _named(plan: FlightPlan) -> FlightSpec:
@@ -122,5 +124,5 @@ def plan_of(folder: Path) -> FlightPlan:
     return FlightPlan.of(spec, Contents(kept.profile, kept.vehicle, kept.plant_vehicle, kept.track_file))
 
 
-def _hash(content: object) -> str:
+def content_hash(content: object) -> str:
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()

@@ -65,13 +65,12 @@ def run(args: Namespace) -> int:
 
     with one_line():
         vehicle = load_vehicle(args.name)
-        text = FILES[args.whom](
-            vehicle, f"{vehicle.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
-        )
+        made_by = f"{vehicle.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
+        text = FILES[args.whom](vehicle, made_by)
     if args.out is None:
         sys.stdout.write(text)
-        return 0
-    _write(args.out, text)
+    else:
+        _write(args.out, text)
     return 0
 
 
