@@ -16,7 +16,7 @@ from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flights import Common, FlightResult
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes, regular
-from colibri.flights.provenance import content_hash
+from colibri.flights.provenance import hash_of
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
@@ -106,8 +106,8 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
         "fly": {name: shown(value) for name, value in campaign.fly.items()},
         "grid": {name: list(map(shown, values)) for name, values in campaign.grid.items()},
         "draw": {name: [type(draw).__name__, repr(draw)] for name, draw in campaign.draw.items()},
-        "contents": {name: content_hash(content) for name, content in contents.items() if content},
-        "objects": content_hash(_plain([campaign.fly, campaign.grid])),
+        "contents": {name: hash_of(content) for name, content in contents.items() if content},
+        "objects": hash_of(_plain([campaign.fly, campaign.grid])),
     }
 
 

@@ -71,10 +71,8 @@ def provenance_of(plan: FlightPlan) -> Provenance:
         "track": with_file(str(plan.spec.track), Path()),
     }
     colibri = version("colibri-sitl")
-    hashes = {name: content_hash(content) for name, content in (contents | nameless).items() if content is not None}
-    return Provenance(
-        colibri=colibri, spec=values, sha256={**hashes, "all": content_hash([colibri, hashes])}, **contents
-    )
+    hashes = {name: hash_of(content) for name, content in (contents | nameless).items() if content is not None}
+    return Provenance(colibri=colibri, spec=values, sha256={**hashes, "all": hash_of([colibri, hashes])}, **contents)
 
 
 def _named(plan: FlightPlan) -> FlightSpec:
@@ -124,5 +122,5 @@ def plan_of(folder: Path) -> FlightPlan:
     return FlightPlan.of(spec, Contents(kept.profile, kept.vehicle, kept.plant_vehicle, kept.track_file))
 
 
-def content_hash(content: object) -> str:
+def hash_of(content: object) -> str:
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
