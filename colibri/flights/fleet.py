@@ -11,8 +11,7 @@ from colibri.autopilot.process.planned_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.earth.home import HomePlace
-from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail, one_line
 from colibri.common.process.log_files import set_aside
 from colibri.common.spec import part_of
 from colibri.flights.effects import FlownOptions, in_words, without_effect
@@ -21,7 +20,6 @@ from colibri.flights.fleet_status import StatusLines
 from colibri.flights.folder import LOGS, occupied, prepare
 from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
 from colibri.plant.events import check_events, plant_events
 from colibri.plant.physics.start import Start
@@ -57,7 +55,8 @@ class Member:
 
 
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
-    note = "\n".join(filter(None, (_check(spec), spec.connect())))
+    with one_line():
+        note = "\n".join(filter(None, (_check(spec), spec.connect())))
     instances = range(spec.instance, spec.instance + spec.count)
     fleet = [Member(it, number * spec.spacing, spec.links(it)) for number, it in enumerate(instances)]
     with ExitStack() as held:
@@ -78,17 +77,14 @@ def sitl(spec: FleetSpec, *, quiet: bool) -> int:
 
 
 def _check(spec: FleetSpec) -> str:
-    try:
-        profile, assumed = spec.load()
-        name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
-        whole = load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed
-        vehicle = whole.without(spec.without)
-        check_events(spec.events, vehicle, on_sensors=spec.feedback is Feedback.SENSORS, served=True)
-        station_events(spec.events)
-        check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
-    except Error as error:
-        fail(str(error))
-    if spec.feedback is Feedback.SENSORS and (vehicle.sensors is None or assumed.sensors is None):
+    profile, assumed = spec.load()
+    name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
+    whole = load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed
+    vehicle, on_sensors = whole.without(spec.without), spec.feedback is Feedback.SENSORS
+    check_events(spec.events, vehicle, on_sensors=on_sensors, served=True)
+    station_events(spec.events)
+    check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
+    if on_sensors and (vehicle.sensors is None or assumed.sensors is None):
         fail(f"--feedback sensors: vehicle {(assumed if vehicle.sensors else vehicle).name} has no table sensors")
     if vehicle.ground is None and "z" not in spec.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
@@ -97,11 +93,8 @@ def _check(spec: FleetSpec) -> str:
     listening = (url for url in spec.gcs if url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0"))
     if spec.count > 1 and (any(listening) or any(url.startswith("serial:") for url in spec.gcs)):
         fail("--gcs: several vehicles cannot have one port; let them call, by udpout: or tcp:, or fly one")
-    try:
-        for instance in range(spec.instance, spec.instance + spec.count):
-            open_link(_plant_url(spec, instance)).close()
-    except LinkError as error:
-        fail(str(error))
+    for instance in range(spec.instance, spec.instance + spec.count):
+        open_link(_plant_url(spec, instance)).close()
     return in_words(without_effect(FlownOptions(spec, name, assumed, vehicle, whole)).items())
 
 

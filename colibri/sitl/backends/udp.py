@@ -27,13 +27,10 @@ _HERE = "udpin:127.0.0.1:0"
 class UdpPlant:
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
+        self.process = self._child.number
         self._link: UdpLink | None = None
         self.clock = QuickClock()
         self._last = self._answer = b""
-
-    @property
-    def process(self) -> int:
-        return self._child.number
 
     def receive(self, datagram: bytes) -> None:
         if self._link is None:
@@ -88,16 +85,13 @@ class UdpAutopilot:
         self._starts = 0
         self.start()
 
-    @property
-    def process(self) -> int:
-        return self._child.number
-
     def start(self) -> None:
         self._starts += 1
         self._link, self._stations = opened(_HERE), opened(_HERE)
         plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
         log = self._folder / f"autopilot-{self._starts}.said"
         self._child = LoggedChild(self._launcher, replace(self._spec, plant=plant, stepped=stations), log)
+        self.process = self._child.number
         self._gathering = Gathering()
         self._time_us = 0
 
