@@ -143,11 +143,12 @@ class PilotedEpisodes(Episodes):
                 if flight.time_us > 2 * until_us or not pilot.state.armed:
                     raise GymError("the vehicle does not reach the start of the track")
         x, y, z = self._first[:3].tolist()
-        self._send(PositionSetpoint((x, y, z), yaw_rad=0.0))
+        here = PositionSetpoint((x, y, z), yaw_rad=0.0)
+        self._send(here)
         pilot.select(Mode.OFFBOARD, {})
         until_us = flight.time_us + round(SETTLE_S * 1e6)
         while flight.time_us < until_us:
-            self._send(PositionSetpoint((x, y, z), yaw_rad=0.0))
+            self._send(here)
             flight.step()
 
     def _send(self, setpoint: OffboardSetpoint) -> None:

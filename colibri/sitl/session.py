@@ -150,13 +150,8 @@ def begin_fleet(
         raise SettingError(f"places: expected one for each of {count} vehicles, found {len(places)}")
     begun = len(flights.flown)
     start = setting_of([{"start": changes.pop("start", flights.setting.start)}]).start
-    return Fleet(
-        flights.begin(
-            **{
-                "system": begun + number + 1,
-                "start": {**start, "x": start.get("x", 0.0) + east, "y": start.get("y", 0.0) + north},
-                **changes,
-            }
-        )
-        for number, (east, north) in enumerate(places)
-    )
+    vehicles = []
+    for number, (east, north) in enumerate(places, begun + 1):
+        place = {**start, "x": start.get("x", 0.0) + east, "y": start.get("y", 0.0) + north}
+        vehicles.append(flights.begin(**{"system": number, "start": place, **changes}))
+    return Fleet(vehicles)

@@ -83,9 +83,7 @@ class Setting(WorldSpec, LawSpec):
     def plant_spec(self) -> PlantSpec:
         start = _STANDING
         if self.airborne is not None:
-            vehicle = load_vehicle(self.vehicle)
-            hover_rpm = vehicle.hover_speed / vehicle.speed_from_rpm(1.0)
-            start = start._replace(z=self.airborne, rotors=hover_rpm)
+            start = start._replace(z=self.airborne, rotors=load_vehicle(self.vehicle).hover_rpm)
         begins = self.started(start)._asdict()
         events = plant_events(self.events)
         return part_of(self, PlantSpec, system_id=self.system, start=begins, truth=True, speed=inf, events=events)
