@@ -108,7 +108,7 @@ def test_code_is_not_json() -> None:
         ({"speed": 0.0}, "speed: must be a number above 0, or max, not 0.0"),
         ({"feedback": "sensor"}, 'feedback: unknown value "sensor" (did you mean "sensors"?)'),
         ({"turbulence": "some"}, 'turbulence: unknown value "some" (choose light, moderate, severe)'),
-        ({"start": {"z": "high"}}, "start: z: must be a number, not high"),
+        ({"start": {"z": "high"}}, 'start: z: must be a number, not "high"'),
         ({"start": "zz=1"}, 'start: unknown key "zz" (did you mean "z"?)'),
         ({"profile": 3}, "profile: must be a name or a Profile, not int"),
         ({"gusts": [3]}, "gusts: must be SPEED@FROM:start=S,duration=S, not int"),
