@@ -132,11 +132,14 @@ def event_of(given: Any, duration_s: float = 0.0) -> Event:
     return found
 
 
+def equipment(vehicle: Vehicle, *, on_sensors: bool) -> set[Equipment]:
+    has = {Equipment.ROTORS: True, Equipment.BATTERY: vehicle.battery is not None, Equipment.SENSORS: on_sensors}
+    return {part for part, there in has.items() if there}
+
+
 def check_events(events: Iterable[Event], vehicle: Vehicle, *, on_sensors: bool, served: bool = False) -> None:
     """Raise an EventError for what this plant cannot do, or ground stations must send unless they are `served`."""
-    parts = {Equipment.ROTORS}
-    parts |= {Equipment.BATTERY} if vehicle.battery is not None else set()
-    parts |= {Equipment.SENSORS} if on_sensors else set()
+    parts = equipment(vehicle, on_sensors=on_sensors)
     for each in events:
         if isinstance(each, StationEvent) and not served:
             raise EventError(

@@ -1,10 +1,11 @@
 """Faults of one vehicle by MAV_CMD_INJECT_FAILURE, each at an instant between two frames."""
 
-from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Equipment, Fault, judged
+from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_UNSUPPORTED
 from colibri.mavlink.wire.refusal import Refusal
+from colibri.plant.events import equipment
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
 from colibri.plant.vehicle.description import Vehicle
@@ -16,11 +17,7 @@ class Faults:
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
         self._physics, self._battery = physics, vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)
-        self.parts = {Equipment.ROTORS}
-        if vehicle.battery is not None:
-            self.parts.add(Equipment.BATTERY)
-        if feedback is Feedback.SENSORS:
-            self.parts.add(Equipment.SENSORS)
+        self.parts = equipment(vehicle, on_sensors=feedback is Feedback.SENSORS)
         self._taken_ah = 0.0
 
     def inject(self, asked: Fault, world: World) -> tuple[World, FaultResult]:

@@ -215,10 +215,7 @@ class Battery(Table, frozen=True, kw_only=True):
 
 
 class Vehicle(Table, frozen=True, kw_only=True):
-    """A multirotor in SI units, except for rotor speeds (`rotors.speed_unit`).
-
-    Parts that are `None` are not modelled.
-    """
+    """A multirotor in SI units, but for rotor speeds (`rotors.speed_unit`). Parts that are `None` are not modelled."""
 
     name: str
     gravity_m_s2: Positive

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFileError, read_table
-from colibri.autopilot.guidance.trajectories.local_fit import local_fit
 from colibri.common.errors import shown
 from colibri.common.types import Array
 
@@ -16,6 +15,7 @@ _PLACE, _VELOCITY, _ACCELERATION = ("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "
 _REQUIRED = ("t", *_PLACE)
 _OPTIONAL = (*_VELOCITY, *_ACCELERATION, "yaw")
 _SMOOTHED_S = 0.5  # time span of the samples that a derivative follows from
+_DEGREE = 4  # of the polynomials
 _MIN_STEP_S = 1e-3
 _TOLERANCE = 0.1  # allowed contradiction between columns, relative to the change between rows
 _LEAST_SMOOTHED = 7
@@ -73,6 +73,40 @@ def read_samples(path: Path, text: str | None = None) -> SampledTrack:
         note = f"{path}: smoothed, by at most {off_m:.2g} m; velocity and acceleration follow"
     said = f"{path}: columns not used: {', '.join(map(shown, unused))}" if unused else ""
     return SampledTrack(times_s, motion, table.yaw_rad, "; ".join(filter(None, (note, said))))
+
+
+def local_fit(times_s: Array, values: Array, count: int) -> tuple[Array, Array, Array]:
+    """Return the smoothed `values` (n, axes) and their first two derivatives.
+
+    Each is of the least-squares polynomial of degree 4 through the nearest `count` samples.
+    """
+    n = len(times_s)
+    count = min(count, n)
+    size = min(_DEGREE, count - 1) + 1
+    first = np.clip(np.arange(n) - count // 2, 0, n - count)
+    scale_s = 0.5 * (times_s[first + count - 1] - times_s[first])
+    moments, sums = np.zeros((2 * size - 1, n)), np.zeros((size, n, values.shape[1]))
+    for offset in range(count):
+        tau, power = (times_s[first + offset] - times_s) / scale_s, np.ones(n)
+        for k in range(2 * size - 1):
+            moments[k] += power
+            if k < size:
+                sums[k] += power[:, None] * values[first + offset]
+            power = power * tau
+    rows = [[moments[i + j].copy() for j in range(size)] for i in range(size)]
+    for i in range(size):
+        for below in range(i + 1, size):
+            factor = rows[below][i] / rows[i][i]
+            for j in range(i, size):
+                rows[below][j] -= factor * rows[i][j]
+            sums[below] -= factor[:, None] * sums[i]
+    for i in reversed(range(size)):
+        for j in range(i + 1, size):
+            sums[i] -= rows[i][j][:, None] * sums[j]
+        sums[i] /= rows[i][i][:, None]
+    zero = np.zeros_like(values)
+    curvature = 2.0 * sums[2] / (scale_s * scale_s)[:, None] if size > 2 else zero
+    return sums[0], sums[1] / scale_s[:, None], curvature
 
 
 def columns_of(times_s: Array, motion: Mapping[str, Array]) -> str:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import MAX_DURATION_S
-from colibri.autopilot.guidance.trajectories.local_fit import local_fit
 from colibri.autopilot.guidance.trajectories.registry import TrackError, tried
-from colibri.autopilot.guidance.trajectories.samples_file import columns_of
+from colibri.autopilot.guidance.trajectories.samples_file import columns_of, local_fit
 from colibri.autopilot.guidance.trajectories.taylor import in_series
 from colibri.autopilot.guidance.trajectories.tracks import Track, TrackOptions, position
 from colibri.autopilot.spec import Trajectory

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import colibri
-from colibri.autopilot.guidance.trajectories.local_fit import local_fit
+from colibri.autopilot.guidance.trajectories.samples_file import local_fit
 from colibri.campaigns.flights import common_of, fly_point
 from tests.support.campaigns import planned
 
