@@ -198,14 +198,9 @@ def identified(companion: Companion) -> Identified:
 def _of_second_order(response: Response, found: Fit) -> Response:
     """Add the lags, and raise the limits to the rate loop's largest demand: a law built for less would brake late."""
     p, q, r = found.acceleration_lag_s.tolist()
+    largest = (response.max_acceleration_rad_s2, response.max_rate_rad_s, response.time_constant_s)
     most_p, most_q, most_r = (
         max(assumed, rate / lag_s) if behind_s > 0.0 else assumed
-        for assumed, rate, lag_s, behind_s in zip(
-            response.max_acceleration_rad_s2,
-            response.max_rate_rad_s,
-            response.time_constant_s,
-            (p, q, r),
-            strict=True,
-        )
+        for assumed, rate, lag_s, behind_s in zip(*largest, (p, q, r), strict=True)
     )
     return response._replace(acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))

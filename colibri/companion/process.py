@@ -5,7 +5,7 @@ import signal
 from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import replace
-from math import degrees, inf, isfinite
+from math import degrees, isfinite
 from pathlib import Path
 from time import perf_counter, time
 from typing import Any, NamedTuple, TextIO
@@ -148,8 +148,7 @@ def fly(args: Namespace) -> int:
             fail(f"{args.out / LOG}: {error.strerror}", EXIT_FAILED)
         finally:
             wire.link.close()
-        given = _given(args, plan)
-        figures = report(companion, summary, given)
+        figures = report(companion, summary, args, plan)
         write_report(figures, args.out / REPORT)
         if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
             if not companion.completed:
@@ -294,20 +293,6 @@ def _identify(companion: Companion, status: Status, out: Path) -> None:
     status.say("identified", f"time constants {lags} ms after {1e3 * found.latency_s:.0f} ms: {out / RESPONSE}")
 
 
-def _given(args: Namespace, plan: CompanionFlight) -> dict[str, Any]:
-    return {
-        "track": args.track or "identification",
-        "track_note": plan.note,
-        "profile": plan.profile.name,
-        "controller": plan.profile.controller,
-        "link": args.vehicle,
-        "vehicle": plan.vehicle.name,
-        "setpoint_kind": plan.settings.setpoints.value,
-        "dry_run": plan.settings.dry_run,
-        "duration_s": None if plan.settings.duration_s == inf else plan.settings.duration_s,
-    }
-
-
 def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Path) -> int:
     ended = companion.ended
     assert ended is not None, "it was served until then"
@@ -326,10 +311,18 @@ def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Pat
 SETTLED_AFTER_S = 20.0
 
 
-def report(companion: Companion, summary: FlightSummary, given: dict[str, Any]) -> dict[str, Any]:
+def report(companion: Companion, summary: FlightSummary, args: Namespace, plan: CompanionFlight) -> dict[str, Any]:
     errors, peer, ended = companion.errors, companion.peer, companion.ended
     return {
-        **given,
+        "track": args.track or "identification",
+        "track_note": plan.note,
+        "profile": plan.profile.name,
+        "controller": plan.profile.controller,
+        "link": args.vehicle,
+        "vehicle": plan.vehicle.name,
+        "setpoint_kind": plan.settings.setpoints.value,
+        "dry_run": plan.settings.dry_run,
+        "duration_s": _finite(plan.settings.duration_s),
         "stack": peer.stack.name if peer.stack else None,
         "feedback": "the vehicle's estimate",
         "ended": "interrupted" if ended is None else ended.why,

@@ -111,15 +111,8 @@ def check_by_command(args: argparse.Namespace) -> int:
 
     console = Console(stderr=True)
     with one_line(), console.status("") as status:
-        found = check_controller(
-            args.name,
-            profile=args.profile,
-            vehicle=args.vehicle,
-            seed=args.seed,
-            duration=args.duration,
-            only=args.only,
-            progress=lambda area: status.update(f"{args.name}: {area}"),
-        )
+        options = {name: getattr(args, name) for name in ("profile", "vehicle", "seed", "duration", "only")}
+        found = check_controller(args.name, **options, progress=lambda area: status.update(f"{args.name}: {area}"))
     if not args.quiet:
         print_table(found.title, HEADINGS, [_cells(row) for row in found.rows], names=len(HEADINGS))
     print(found.failures, end="")  # noqa: T201

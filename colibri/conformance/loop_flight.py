@@ -90,14 +90,7 @@ HOW = ("seamless", "anew", "blind")
 
 
 def restarted(
-    track: str,
-    *,
-    how: str,
-    controller: Any,
-    profile: Any = None,
-    vehicle: Any = None,
-    seed: int = 0,
-    **options: Any,
+    track: str, *, how: str, controller: Any, profile: Any = None, vehicle: Any = None, seed: int = 0, **options: Any
 ) -> Restarted:
     """Fly on with a new control loop: `seamless` from a recent checkpoint, `anew` from charge and mass, or `blind`."""
     subject = Subject.of(controller, profile, vehicle, seed)

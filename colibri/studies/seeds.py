@@ -62,12 +62,8 @@ def _cells(table: FlightTable, places: Sequence[int]) -> Row:
     """Return RMS over flights, mean NEES, and in brackets the largest."""
     through = table.through(places)
     errors = (_cell(table.metric(name)[through], rms) for name in _ERRORS)
-    return (
-        str(len(places)),
-        str(len(places) - len(through)),
-        *errors,
-        _cell(table.metric(NEES)[through], np.mean),
-    )
+    flown, lost = str(len(places)), str(len(places) - len(through))
+    return (flown, lost, *errors, _cell(table.metric(NEES)[through], np.mean))
 
 
 def _cell(column: Array, middle: Callable[[Array], Any]) -> str:

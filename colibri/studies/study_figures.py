@@ -21,12 +21,7 @@ LIMITS_SHOWN_S = 6.0
 
 _LEGEND_ROW_IN = 0.24
 _SHADE = "#E8E8E8"
-_CONTENDERS = {
-    "thesis": "#D55E00",
-    "SE(3)": "#0072B2",
-    "LPV-MPC": "#000000",
-    "LPV-MPC on the path": "#009E73",
-}
+_CONTENDERS = {"thesis": "#D55E00", "SE(3)": "#0072B2", "LPV-MPC": "#000000", "LPV-MPC on the path": "#009E73"}
 _MOST_M = 50.0
 """Larger errors are drawn at this one."""
 _ALSO_WITHOUT = ("SE(3)", "LPV-MPC")
@@ -207,11 +202,8 @@ def _limits(result: StudyResult) -> Figure:
     figure.subplots_adjust(left=0.12)
     error.set_xlim(begin_s, end_s)
     error.set_xlabel("t (s)")
-    put_head(
-        figure,
-        f"{result.row[0]}, rotors up to {result.row[1]} rad/s, {result.row[2]} battery: limits",
-        columns=5,
-    )
+    track, speed_rad_s, battery = result.row
+    put_head(figure, f"{track}, rotors up to {speed_rad_s} rad/s, {battery} battery: limits", columns=5)
     return figure
 
 

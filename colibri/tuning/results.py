@@ -144,17 +144,12 @@ class TuningResults:
 
     def rows(self) -> list[Row]:
         """Return the table of trials; numbers with ten digits."""
-        return [
-            (
-                str(trial.number),
-                self._state(trial),
-                str(trial.flights),
-                str(trial.lost),
-                *(f"{value:.10g}" for value in trial.values),
-                *(str(trial.params[name]) for name in self.tuning.space),
-            )
-            for trial in self.trials
-        ]
+        rows: list[Row] = []
+        for trial in self.trials:
+            head = (str(trial.number), self._state(trial), str(trial.flights), str(trial.lost))
+            params = (str(trial.params[name]) for name in self.tuning.space)
+            rows.append((*head, *(f"{value:.10g}" for value in trial.values), *params))
+        return rows
 
     def plot(self, what: str = "importance") -> "Figure":
         """Return a figure: history, slices, from eight trials on importance, with several objectives pareto."""

@@ -26,10 +26,7 @@ _POLYGONS = {
     mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
     mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
 }
-_CIRCLES = {
-    mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
-    mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
-}
+_CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False}
 
 Place = Callable[[MissionItem], Vector]
 """(item) -> its place in the local frame, ENU; nan if unknown."""

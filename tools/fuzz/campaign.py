@@ -4,10 +4,11 @@ import random
 import signal
 import tempfile
 from collections.abc import Mapping
+from contextlib import closing
 from math import ceil
 from pathlib import Path
 from time import monotonic, perf_counter, sleep
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import psutil
 
@@ -196,46 +197,35 @@ class JobResult(NamedTuple):
     failures: list[str]
 
 
+_Fired: TypeAlias = tuple[str, int, tuple[float, float], str]
+"""Target, number of datagrams or messages, memory in MiB before and after, and what was reached."""
+
+
 def fire(job: Job) -> JobResult:
-    started_s = perf_counter()
+    began_s = perf_counter()
+    whom, run = ("lockstep", _lockstep) if job.datagrams else ("ground stations", _ground)
     with tempfile.TemporaryDirectory() as name:
-        return (_lockstep if job.datagrams else _ground)(job, Path(name), started_s)
+        rows, failures = run(job, Path(name))
+    took_s = perf_counter() - began_s
+    lines = [
+        f"{target:<16}{job.seed:>6}{sent:>10}{before:>12.2f}{after:>9.2f}{took_s:>7.0f}  "
+        f"{'FAILED' if failures else reached}"
+        for target, sent, (before, after), reached in rows
+    ]
+    return JobResult(lines, [f"seed {job.seed}, {whom}: {failure}" for failure in failures])
 
 
-def _lockstep(job: Job, folder: Path, started_s: float) -> JobResult:
+def _lockstep(job: Job, folder: Path) -> tuple[list[_Fired], list[str]]:
     outcome = campaign(folder, job.datagrams, burst=BURST, seed=job.seed)
     failures = outcome.failures + [f"{outcome.lost} datagrams never arrived"] * (outcome.lost > 0)
-    lines = []
-    for name, memory_mib in outcome.memory_mib.items():
-        sent = sum(count for (whom, _), count in outcome.sent.items() if whom == name)
-        lines.append(_line(name, job.seed, sent, memory_mib, started_s, "the flight is unchanged", failures))
-    return JobResult(lines, [f"seed {job.seed}, lockstep: {failure}" for failure in failures])
+    sent = {name: sum(n for (whom, _), n in outcome.sent.items() if whom == name) for name in outcome.memory_mib}
+    reached = "the flight is unchanged"
+    return [(name, sent[name], memory, reached) for name, memory in outcome.memory_mib.items()], failures
 
 
-def _ground(job: Job, path: Path, started_s: float) -> JobResult:
-    folder = Folder(path)
-    outcome = ground_campaign(job.messages, seed=job.seed, files=folder)
-    folder.close()
-    reached = (
-        f"{outcome.accepted} commands of {outcome.kinds} kinds accepted, {len(outcome.sent)} states met, "
-        f"{outcome.flown_s:.0f} s flown"
-    )
-    sent = sum(outcome.sent.values())
-    line = _line("ground stations", job.seed, sent, outcome.memory_mib, started_s, reached, outcome.failures)
-    return JobResult([line], [f"seed {job.seed}, ground stations: {failure}" for failure in outcome.failures])
-
-
-def _line(
-    name: str,
-    seed: int,
-    sent: int,
-    memory_mib: tuple[float, float],
-    started_s: float,
-    reached: str,
-    failures: list[str],
-) -> str:
-    before, after = memory_mib
-    took_s = perf_counter() - started_s
-    return (
-        f"{name:<16}{seed:>6}{sent:>10}{before:>12.2f}{after:>9.2f}{took_s:>7.0f}  {'FAILED' if failures else reached}"
-    )
+def _ground(job: Job, path: Path) -> tuple[list[_Fired], list[str]]:
+    with closing(Folder(path)) as folder:
+        outcome = ground_campaign(job.messages, seed=job.seed, files=folder)
+    accepted = f"{outcome.accepted} commands of {outcome.kinds} kinds accepted"
+    reached = f"{accepted}, {len(outcome.sent)} states met, {outcome.flown_s:.0f} s flown"
+    return [("ground stations", sum(outcome.sent.values()), outcome.memory_mib, reached)], outcome.failures

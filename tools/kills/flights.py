@@ -139,20 +139,9 @@ def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[AutopilotKill]
         hovered = kill.item in HOVERS and speed[now] < _SLOW_M_S
         still = bool(hovered and following is not None and following.item == kill.item)
         away = np.linalg.norm(place[near] - place[now], axis=1)
-        found.append(
-            AutopilotKill(
-                kill.time_s,
-                kill.phase,
-                kill.item,
-                bool(hovered),
-                still,
-                float(tilt[after].max()),
-                float(tilt[before].max()),
-                float(place[now, 2] - place[near, 2].min()) if still else 0.0,
-                float(away.max()) if still else 0.0,
-                kill.went_on,
-            )
-        )
+        tilts_deg = (float(tilt[after].max()), float(tilt[before].max()))
+        moved_m = (float(place[now, 2] - place[near, 2].min()), float(away.max())) if still else (0.0, 0.0)
+        found.append(AutopilotKill(*kill[:3], bool(hovered), still, *tilts_deg, *moved_m, kill.went_on))
     return found
 
 

@@ -202,15 +202,8 @@ class LawPilot:
     def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, Vector | None]:
         generator = self._generator
         assert generator.reference is not None, "it was begun"
-        context = TaskContext(
-            time_us,
-            state,
-            generator.reference,
-            state.position_enu_m,
-            self._behaviour,
-            generator.interval_s,
-            generator.samples,
-        )
+        place, grid = state.position_enu_m, (generator.interval_s, generator.samples)
+        context = TaskContext(time_us, state, generator.reference, place, self._behaviour, *grid)
         wanted = self._task.update(context)
         assert isinstance(wanted, PositionMotion | PlannedMotion), "no task of these asks for attitudes"
         horizon = generator.lead(context, wanted)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
-from colibri.autopilot.guidance.trajectories.tracks import Hover, Place, Track
+from colibri.autopilot.guidance.trajectories.tracks import Hover, Track
 from colibri.common.types import Vector
 from colibri.mavlink.client.states import TimedState
 
@@ -24,21 +24,9 @@ _FIRST_POWER = 5
 
 
 def smoothly_started(track: Track, over_s: float = OVER_S) -> Track:
-    look = track.yaw
-
-    def position(t: TaylorSeries) -> Place:
-        return track.position(_warped(t, over_s))
-
-    def yaw(t: TaylorSeries) -> TaylorSeries:
-        assert look is not None, "used only where there is a formula"
-        return look(_warped(t, over_s))
-
-    return replace(
-        track,
-        position=position,
-        yaw=None if look is None else yaw,
-        duration_s=track.duration_s + 0.5 * over_s,
-    )
+    look, duration_s = track.yaw, track.duration_s + 0.5 * over_s
+    yaw = None if look is None else lambda t: look(_warped(t, over_s))
+    return replace(track, position=lambda t: track.position(_warped(t, over_s)), yaw=yaw, duration_s=duration_s)
 
 
 def _warped(t: TaylorSeries, over_s: float) -> TaylorSeries:

@@ -49,18 +49,9 @@ def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
 
 def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
     """Return the rate commands that lead to `next_rate` in an interval, by the inverse without acceleration lag."""
-    p, q, r = (
-        _rate_command(now, then, interval_s, *of)
-        for now, then, *of in zip(
-            rate,
-            next_rate,
-            response.time_constant_s,
-            response.max_rate_rad_s,
-            response.max_acceleration_rad_s2,
-            response.acceleration_lag_s,
-            strict=True,
-        )
-    )
+    limits = (response.max_rate_rad_s, response.max_acceleration_rad_s2)
+    axes = zip(rate, next_rate, response.time_constant_s, *limits, response.acceleration_lag_s, strict=True)
+    p, q, r = (_rate_command(now, then, interval_s, *of) for now, then, *of in axes)
     return (p, q, r)
 
 

@@ -126,14 +126,8 @@ class VehicleScene:
                 )
             above = (place[0], place[1], 0.12 * radius)
             discs.append(scene.add_cylinder(f"{at}/disc{rotor}", radius, 0.03 * radius, opacity=0.7, position=above))
-            blades.append(
-                scene.add_box(
-                    f"{at}/blade{rotor}",
-                    dimensions=(1.9 * radius, 0.2 * radius, 0.07 * radius),
-                    color=_DARK,
-                    position=above,
-                )
-            )
+            size = (1.9 * radius, 0.2 * radius, 0.07 * radius)
+            blades.append(scene.add_box(f"{at}/blade{rotor}", dimensions=size, color=_DARK, position=above))
         return blades, discs
 
 
