@@ -49,10 +49,6 @@ class Member:
     boot_unix_us: int = 0
     deaths_s: list[float] = field(default_factory=list)
 
-    @property
-    def system_id(self) -> int:
-        return self.instance + 1
-
 
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
     with one_line():
@@ -133,7 +129,7 @@ def _start_autopilot(member: Member, spec: FleetSpec) -> None:
 
 
 def _start(kind: type[PlantSpec | AutopilotSpec], member: Member, spec: FleetSpec, own: dict[str, Any]) -> None:
-    own |= {"home": place_of(member, spec), "system_id": member.system_id, "boot_unix_us": member.boot_unix_us}
+    own |= {"home": place_of(member, spec), "system_id": member.instance + 1, "boot_unix_us": member.boot_unix_us}
     member.children.append(Child(part_of(spec, kind, **own, out=spec.folder(member.instance), tlog=True)))
 
 

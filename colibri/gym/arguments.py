@@ -3,13 +3,14 @@
 from argparse import ArgumentTypeError
 from collections.abc import Mapping
 from pathlib import Path, PurePath
+from types import NoneType
 from typing import Any
 
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
 from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
-from colibri.common.errors import shown, unknown
+from colibri.common.errors import checked, shown, unknown
 from colibri.common.matrices import norm
 from colibri.common.types import Array
 from colibri.gym.errors import GymError
@@ -46,14 +47,10 @@ def gates_of(points: Array, preview: int) -> Array:
     return np.vstack([gates, np.tile((*points[-1], *units[-1], 0.0), (preview + 1, 1))])
 
 
-def mapping_of(draw: Any) -> Mapping[str, Any]:
-    if draw is not None and not isinstance(draw, Mapping):
-        raise GymError(f'draw must be a table of keys, not {type(draw).__name__} "{shown(draw)}"')
-    return draw or {}
-
-
-def read_draws(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Draw]]:
-    """Return fixed values and distributions by key, in alphabetical order."""
+def read_draws(usual: Mapping[str, Any], own: Mapping[str, Any] | None) -> tuple[dict[str, Any], dict[str, Draw]]:
+    """Return fixed values and distributions by key, in alphabetical order; `own` keys replace `usual` ones."""
+    checked("draw", own, (Mapping, NoneType), "a table of keys", GymError)
+    given = {**usual, **(own or {})}
     known = ("wind", "lost", "vehicle.body.mass_kg", *(f"start.{key}" for key in Start._fields))
     fixed: dict[str, Any] = {}
     draws: dict[str, Draw] = {}

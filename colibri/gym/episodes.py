@@ -22,7 +22,7 @@ from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.gym import kernels
-from colibri.gym.arguments import gate_points, gates_of, mapping_of, read_draws, wind_of, within
+from colibri.gym.arguments import gate_points, gates_of, read_draws, wind_of, within
 from colibri.gym.errors import GymError
 from colibri.plant.environment.air import CALM
 from colibri.plant.environment.weather import Wind
@@ -159,7 +159,7 @@ class Episodes:
         else:
             raise GymError(f'track must be left out, not "{shown(track)}", in a race through gates')
         drawn = self.near if start == "near" else {**_THROWN, "lost": {"choice": [-1, *range(rotors)]}}
-        self._fixed, self._draws = read_draws({**drawn, **mapping_of(draw)})
+        self._fixed, self._draws = read_draws(drawn, draw)
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
         self.x = np.zeros((count, first.x.size))

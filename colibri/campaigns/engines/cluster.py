@@ -1,6 +1,6 @@
 """Run jobs on a Dask cluster."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from itertools import islice, takewhile
 from time import perf_counter
@@ -8,7 +8,7 @@ from typing import Any
 
 import cloudpickle
 
-from colibri.campaigns.engines.pool import Job, Killed, Result
+from colibri.campaigns.engines.pool import Job, Killed, Result, Results
 from colibri.campaigns.factors import CampaignError
 
 _PACKAGE = "colibri-sitl"
@@ -50,9 +50,7 @@ class Cluster:
         if self._ours:
             self._client.close()
 
-    def each(
-        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
-    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+    def each(self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]) -> Results[Job, Result]:
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
 

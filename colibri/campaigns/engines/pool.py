@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from multiprocessing import active_children, current_process, get_context, parent_process
 from threading import Thread
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import cloudpickle
 
@@ -24,14 +24,15 @@ class Killed:
     """The result of a job that killed its worker twice, the second time alone."""
 
 
+Results: TypeAlias = Generator[tuple[Job, Result | Killed], None, None]
+
+
 class Engine(Protocol):
     """Runs many jobs at once; a remote one on other computers."""
 
     is_remote: bool
 
-    def each(
-        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
-    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+    def each(self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]) -> Results[Job, Result]:
         """Yield each job with its result, in order of completion; `work` and `common` are pickled."""
 
 
@@ -50,9 +51,7 @@ class Pool:
             sys.exit(1)
         self._workers = workers or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
 
-    def each(
-        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
-    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+    def each(self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]) -> Results[Job, Result]:
         packed = cloudpickle.dumps((work, common))
         left = iter(jobs)
         while broken := (yield from self._done(packed, left, self._workers)):
