@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.outcome import keep_flight
-from colibri.common.process.lifecycle import fail
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan
@@ -33,7 +32,7 @@ class TrackCase(NamedTuple):
         """Return the hash of the trajectory; logs are in `out`."""
         prepare(out)
         if self.waypoints:
-            _write(out / _WAYPOINTS_FILE, self.waypoints)
+            (out / _WAYPOINTS_FILE).write_text(self.waypoints, encoding="utf-8")
         plan = self.plan(out, **more, link=link)
         figures = keep_flight(plan, fly_plan(plan))
         sha256: str = figures["trajectory_sha256"]
@@ -79,10 +78,3 @@ def show_table(title: str, headings: Iterable[str], rows: Iterable[Iterable[str]
     for row in rows:
         table.add_row(*map(escape, row))
     Console().print(table)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(f"cannot write {path}: {error.strerror}")
