@@ -1,7 +1,6 @@
 """The stages of a vehicle with ground stations; after an exception it flies on (see `core.defence`)."""
 
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
 
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.profile import Profile
@@ -29,8 +28,6 @@ from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
 
 _SETTLES_WITHIN_US = 100_000  # parameters are settled this often even if messages use up the budget
-
-T = TypeVar("T")
 
 
 def copter_autopilot(

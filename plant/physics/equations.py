@@ -233,13 +233,6 @@ def battery(speeds: Array | PerRotor, charge_ah: float, parameters: PlantParamet
 
 
 @compiled
-def derivative(x: Array, target: PerRotor, parameters: Packed) -> Array:
-    change = np.empty_like(x)
-    write_derivative(change, x, target, parameters[0])
-    return change
-
-
-@compiled
 def specific_force(x: Array, parameters: Packed) -> Vector:
     numbers = parameters[0]
     R = rotation_matrix((x[9], x[10], x[11], x[12]))

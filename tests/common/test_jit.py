@@ -63,7 +63,7 @@ def doubled(x):
 def test_there_are_kernels_on_both_sides() -> None:
     assert {
         "colibri.autopilot.control.lpv_mpc.deviations.respond",
-        "colibri.plant.physics.equations.derivative",
+        "colibri.plant.physics.equations.write_derivative",
         "colibri.common.elementary.sin",
     } <= set(KERNELS)
 

@@ -3,8 +3,10 @@
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon, VehicleState
+from colibri.common.jit import Packed
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
-from colibri.common.types import Vector
+from colibri.common.types import Array, PerRotor, Vector
+from colibri.plant.physics.equations import write_derivative
 from colibri.plant.physics.world import World, state_frame
 
 _NOTHING: Vector = (0.0, 0.0, 0.0)
@@ -27,3 +29,10 @@ def state_of(world: World) -> VehicleState:
 def staying(samples: int) -> Horizon:
     nowhere, east = np.zeros((samples, 3)), np.zeros(samples)
     return Horizon(nowhere, nowhere, nowhere, nowhere, nowhere, east, east, east)
+
+
+def derivative(x: Array, target: PerRotor, parameters: Packed) -> Array:
+    """Return x' of the plant's equations."""
+    change = np.empty_like(x)
+    write_derivative(change, x, target, parameters[0])
+    return change

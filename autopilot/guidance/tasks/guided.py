@@ -47,13 +47,12 @@ class GuidedTask(EndlessTask):
     def __init__(
         self, attitude: AttitudeReference | None, gravity_m_s2: float, settings: Callable[[], GuidedSettings]
     ) -> None:
-        self._attitude, self._gravity_m_s2, self._settings = attitude, gravity_m_s2, settings
+        self._gravity_m_s2, self._settings = gravity_m_s2, settings
         self._tilt = TiltLoop(attitude) if attitude else None
         self._setpoint: OffboardSetpoint | None = None
         self._loop: HeightLoop | None = None
         self._hold = HoldTask()
         self._turn: Turn | None = None
-        self._speed_m_s: float | None = None
         self.paused = False
 
     @property

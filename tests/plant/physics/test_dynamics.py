@@ -11,12 +11,13 @@ from colibri.common.jit import Packed, packed
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.plant.environment.air import CALM
-from colibri.plant.physics.equations import attitude_of, derivative
+from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import adaptive_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.plant_flights import flight, hover, hummingbird, rpm
+from tests.support.states import derivative
 from tests.support.strategies import quaternions, vectors
 
 INERTIA = (0.0034, 0.0041, 0.006)
