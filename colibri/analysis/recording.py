@@ -199,7 +199,6 @@ def path_times(times_s: Array, lags: Lags) -> Array:
 
 
 def columns_of(plan: FlightPlan) -> tuple[str, ...]:
-    """Return the columns of a flight's samples."""
     return COLUMNS + _MORE_ROTORS[: max(plan.plant_vehicle.rotors.count - len(ROTORS), 0)]
 
 

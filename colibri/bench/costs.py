@@ -87,7 +87,6 @@ def served(plan: FlightPlan, channels: int) -> Figures:
 
 
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
-    """Fly at real time beside ground stations."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(stations)]
         for sock in sockets:  # takes datagrams, and ignores them

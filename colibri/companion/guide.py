@@ -105,7 +105,6 @@ class Companion:
 
     @property
     def completed(self) -> bool:
-        """Whether the track or all steps were flown."""
         return self._brakes
 
     def last_order(self) -> list[bytes]:

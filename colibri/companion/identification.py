@@ -177,7 +177,6 @@ class Identified(NamedTuple):
 
 
 def identified(companion: Companion) -> Identified:
-    """Fit the response to a companion's steps."""
     stack, steps = companion.peer.stack, companion.steps
     assert stack is not None, "it has flown"
     assert steps is not None, "it was an identification"

@@ -35,7 +35,6 @@ class Orders:
 
     @property
     def disarms(self) -> bool:
-        """Whether a command to disarm awaits its answer."""
         return self._disarming and "disarm" not in self._peer.results
 
     @property

@@ -1,8 +1,8 @@
 """A setpoint as message and as row of the log, and totals of rows."""
 
-from collections import Counter
+from collections import Counter, namedtuple
 from math import acos, cos, dist, nan, sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
@@ -14,50 +14,16 @@ from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.conversation import Encoded
 from colibri.mavlink.client.setpoints import attitude_target, position_target
 
+LogRow = namedtuple(
+    "LogRow",
+    "t phase on_track track_s state_age_s round_trip_s x y z vx vy vz phi theta psi p q r "
+    "ref_x ref_y ref_z ref_vx ref_vy ref_vz ref_psi error_m p_cmd q_cmd r_cmd thrust thrust_n thrust_scale "
+    "push_x push_y push_z fallback sent",
+)
+"""A setpoint and its inputs at the time of effect, s on the companion's clock, m, rad, ENU and FLU.
 
-class LogRow(NamedTuple):
-    """A setpoint and its inputs at the time of effect, s on the companion's clock, m, rad, ENU and FLU.
-
-    `thrust`, 0..1, stands for `thrust_n`; `push_*` is the disturbance, m/s²; `fallback` is as in flight.csv.
-    """
-
-    t: float
-    phase: str
-    on_track: int
-    track_s: float
-    state_age_s: float
-    round_trip_s: float
-    x: float
-    y: float
-    z: float
-    vx: float
-    vy: float
-    vz: float
-    phi: float
-    theta: float
-    psi: float
-    p: float
-    q: float
-    r: float
-    ref_x: float
-    ref_y: float
-    ref_z: float
-    ref_vx: float
-    ref_vy: float
-    ref_vz: float
-    ref_psi: float
-    error_m: float
-    p_cmd: float
-    q_cmd: float
-    r_cmd: float
-    thrust: float
-    thrust_n: float
-    thrust_scale: float
-    push_x: float
-    push_y: float
-    push_z: float
-    fallback: int
-    sent: int
+`thrust`, 0..1, stands for `thrust_n`; `push_*` is the disturbance, m/s²; `fallback` is as in flight.csv.
+"""
 
 
 class TrackErrors:

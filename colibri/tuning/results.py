@@ -104,7 +104,6 @@ class TuningResults:
         self.verdict: list[Compared] = []
 
     def add_check(self, checked: CampaignResults) -> None:
-        """Add the flights with `check_seeds`."""
         self.checked = checked
         self.verdict = compare(self.tuning, checked)
 
@@ -119,7 +118,6 @@ class TuningResults:
         return self.file_of(self.best)
 
     def file_of(self, trial: FinishedTrial) -> str:
-        """Return the file of a trial's profile."""
         from importlib.metadata import version
 
         tuning, first = self.tuning, self.trials[0]
@@ -138,7 +136,6 @@ class TuningResults:
 
     @property
     def headings(self) -> Row:
-        """Column names of `rows`."""
         objectives = (objective.name for objective in self.tuning.objectives)
         return ("trial", "state", "flights", "lost", *objectives, *self.tuning.space)
 
@@ -175,7 +172,6 @@ class TuningResults:
         return path
 
     def save_verdict(self, folder: Path) -> None:
-        """Write `verdict.csv` into a folder."""
         rows = [each.row for each in self.verdict]
         (folder / "verdict.csv").write_text(comma_separated(HEADINGS, rows), encoding="utf-8")
 

@@ -178,7 +178,6 @@ def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
 
 
 def metrics_of(objectives: Sequence[Objective], metrics: Sequence[Metric]) -> tuple[Metric, ...]:
-    """Return the metrics to keep, first the objectives'."""
     names = {metric.name: metric for metric in metrics}
     needed = [each.metric for each in objectives if each.metric != SHARE_LOST]
     found = {name: names.get(name) or read_metrics([name])[0] for name in needed}

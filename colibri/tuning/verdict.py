@@ -98,7 +98,6 @@ class _Pairs:
         self._names = [", ".join(shown(point.factors[name]) for name in several) for point in points]
 
     def compared(self, objective: Objective, *, is_objective: bool) -> Iterator[Compared]:
-        """Compare a number over all combinations and each."""
         counts = self._counts(objective, penalised=is_objective)
         each = zip(self._names, np.moveaxis(counts, 1, 0), strict=True) if len(self._names) > 1 else ()
         for where, some in ((ALL, counts), *each):

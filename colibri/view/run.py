@@ -57,7 +57,6 @@ class Show:
         self._is_told = self._is_plotted = False
 
     def turn(self, now_s: float) -> None:
-        """Apply user actions and update the page."""
         if not self._has_begun and self._page.watched:
             self._begins_at_s = min(self._begins_at_s, now_s + (PLOTTED_AFTER_S if self._page.laid_out else WAITS_S))
         if not self._has_begun and now_s >= self._begins_at_s:

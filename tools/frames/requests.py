@@ -73,7 +73,6 @@ class Sender:
 
 
 def _once(messages: Callable[[Sender], list[bytes]]) -> Request:
-    """Send some messages in one frame."""
     return lambda flight: iter([messages(Sender(flight))])
 
 
@@ -275,7 +274,6 @@ REQUESTS: Mapping[str, Request] = {
 
 
 def in_the_air(flight: BareFlight) -> None:
-    """Put the vehicle into the air, in hold."""
     flight.reset_world(HIGH)
     flight.copter.pilot.ground.take_off(0)
     flight.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 21196.0)

@@ -140,7 +140,6 @@ class Fuzzer:
         return frame(ACTUATORS, pack("<QQ16fB", self.moment_us, 1, *controls, 0xFF), self._peer)
 
     def _command(self) -> bytes:
-        """Return any command, or another frame interval."""
         command = self._chance.choice((_SET_MESSAGE_INTERVAL, 400, self._chance.randrange(65536)))
         message_id = self._chance.choice((float(ATTITUDE), self._value()))
         interval_us = self._chance.choice((1000.0, 50_000.0, 1e6, self._value()))

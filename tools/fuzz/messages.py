@@ -45,7 +45,6 @@ class Sent(NamedTuple):
 
     @property
     def wants_answer(self) -> bool:
-        """Whether the vehicle must acknowledge it."""
         if self.name not in COMMANDS or self.source == VEHICLE:
             return False
         return self.fields["target_system"] in (0, VEHICLE[0]) and self.fields["target_component"] in (0, VEHICLE[1])

@@ -149,7 +149,6 @@ _NUMBA_CPUS = {"generic": (), "haswell": _AVX2, "skylake-avx512": _AVX512}
 
 
 def _numpy_without_simd() -> Variation:
-    """Disable the features that numpy found."""
     found: list[str] = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Variation(
         name="numpy-without-simd",

@@ -56,7 +56,6 @@ class RandomFlight(NamedTuple):
 
     @property
     def well(self) -> bool:
-        """Whether vehicle and ground station stay well."""
         return all(event.what not in ("inject", "silence") for event in self.events)
 
     @property

@@ -103,7 +103,6 @@ TRIALS = {
 
 
 def fly(vehicle: Vehicle, trial: Trial, profile: Any = "flight", controller: str | None = None) -> Outcome:
-    """Fly one vehicle."""
     try:
         return _flown(vehicle, trial, profile, controller)
     except Error as error:

@@ -70,7 +70,6 @@ def _thing(name: str, thing: Any, origins: dict[str, str]) -> Iterator[str]:
 
 
 def _options(kind: type) -> Iterator[str]:
-    """List options by name."""
     if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
         names = ", ".join(f"`{name}`" for name, field in fields_of(kind).items() if field.option.keyword)
         yield f"Options, described in {_OPTIONS[kind.__name__]}: {names}.\n"
@@ -119,7 +118,6 @@ def _rows(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _signature(name: str, function: Any) -> str:
-    """Return names and defaults of the arguments."""
     parts, star = [], False
     for parameter in inspect.signature(function).parameters.values():
         if parameter.name == "self":
