@@ -11,8 +11,7 @@ from tempfile import TemporaryDirectory
 from colibri.common.process.lifecycle import gc_frozen, use_one_thread
 from colibri.mavlink.files.folder import Folder
 from tools.frames.requests import REQUESTS, Request, in_the_air
-from tools.fuzz.messages import Messages
-from tools.fuzz.sensible import COMMANDS
+from tools.fuzz.messages import COMMANDS, Messages
 from tools.fuzz.vehicle import BareFlight
 from tools.harness.frame_times import FrameTimes, gc_off
 

@@ -35,8 +35,7 @@ from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.stepping import Steered, Stepped
 from colibri.sitl.vehicle import FORCE
-from tools.fuzz.messages import Messages, Sent
-from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
+from tools.fuzz.messages import COMMANDS, SENSIBLE, Messages, Sent, asked
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 STANDING = Start()
