@@ -21,6 +21,12 @@ class ArgumentParser(argparse.ArgumentParser):
         told = "(default" in help or more.get("default", SUPPRESS) in (SUPPRESS, None, 0, [])
         self.add_argument(name, metavar=metavar, help=help if told else f"{help} (default %(default)s)", **more)
 
+    def several(self, name: str, metavar: str, help: str, usual: str = "", **more: Any) -> None:
+        """Add an option that may be repeated; `usual` tells its default, else an empty list."""
+        words = f"{help}; may be repeated" + (f" (default: {usual})" if usual else "")
+        more = ({} if usual else {"default": []}) | more
+        self.add_argument(name, action="append", metavar=metavar, help=words, **more)
+
     def flag(self, name: str, help: str) -> None:
         self.add_argument(name, action="store_true", help=help)
 

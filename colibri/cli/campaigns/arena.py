@@ -9,12 +9,11 @@ from colibri.common.process.arguments import ArgumentParser
 def add_options(parser: ArgumentParser) -> None:
     add = parser.value
     add("sets", "SET", "race, race-told, robust, policy, planning, or a FILE.toml of your own", nargs="+")
-    add(
+    parser.several(
         "--law",
         "LAW",
-        "a profile, or another controller with it, PROFILE:CONTROLLER; a controller; or FILE.py[:CLASS]; may be "
-        "repeated (default: agile, flight, se3)",
-        action="append",
+        "a profile, or another controller with it, PROFILE:CONTROLLER; a controller; or FILE.py[:CLASS]",
+        "agile, flight, se3",
     )
     add("--starts", "N", "starts a millimetre apart, 1 to 7, of which the worst counts", type=int, default=5)
     add_engine(parser)

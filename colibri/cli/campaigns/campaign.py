@@ -14,23 +14,18 @@ def add_options(parser: ArgumentParser) -> None:
     add = parser.value
     add("file", "FILE.toml", "the campaign; options take precedence over it", nargs="?", type=Path)
     add("--track", "TRACK", "a track; may be repeated: each is flown", dest="tracks", action="append")
-    add(
+    parser.several(
         "--set",
         "KEY=VALUES",
         "a factor and its values, A,B,C or FIRST:LAST:COUNT: an option of a flight, or a number of profile., "
-        "vehicle. or plant-vehicle. by its dotted key; KEY* multiplies what the file has; may be repeated",
+        "vehicle. or plant-vehicle. by its dotted key; KEY* multiplies what the file has",
         dest="settings",
-        action="append",
-        default=[],
     )
-    add(
+    parser.several(
         "--draw",
         "KEY=DISTRIBUTION",
-        "a factor drawn for each flight: uniform:LOW:HIGH, log-uniform:LOW:HIGH, normal:MEAN:DEVIATION or "
-        "choice:A,B,C; may be repeated",
+        "a factor drawn for each flight: uniform:LOW:HIGH, log-uniform:LOW:HIGH, normal:MEAN:DEVIATION or choice:A,B,C",
         dest="draws",
-        action="append",
-        default=[],
     )
     add("--seeds", "FIRST-LAST", "every combination is flown by each (default 0)", default=SUPPRESS)
     add("--root-seed", "N", "of the draws (default 0)", type=int, default=SUPPRESS)

@@ -11,20 +11,14 @@ from colibri.flights.spec import FlightSpec
 
 def add_options(parser: ArgumentParser) -> None:
     add = parser.value
-    add(
+    parser.several(
         "--profile",
         "NAME[:CONTROLLER]",
-        "a profile, or another controller with it; may be repeated (default: thesis, thesis-euler, "
-        "thesis:global-lpv-mpc, se3)",
-        action="append",
+        "a profile, or another controller with it",
+        "thesis, thesis-euler, thesis:global-lpv-mpc, se3",
     )
-    add("--track", "TRACK", "a track; may be repeated (default: the thesis's five)", action="append")
-    add(
-        "--controller",
-        "NAME",
-        "control law of every profile given without one; may be repeated (default: its own)",
-        action="append",
-    )
+    parser.several("--track", "TRACK", "a track", "the thesis's five")
+    parser.several("--controller", "NAME", "control law of every profile given without one", "its own")
     add("--seeds", "FIRST-LAST", "fly each with all of these seeds, and show the spread of errors", type=seeds)
     parser.flag("--resume", "reuse flights in --out with the same contents")
     add_spec(parser, FlightSpec, leave_out=("track", "profile", "controller", "speed"), keywords_only=True)

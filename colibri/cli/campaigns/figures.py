@@ -7,9 +7,8 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add = parser.value
     add_out(parser, "out/thesis", "PNG and SVG")
-    add("--only", "NUMBER", "only this figure, for example 4.9; may be repeated", action="append")
+    parser.several("--only", "NUMBER", "only this figure, for example 4.9", default=None)
 
 
 def run(args: Namespace) -> int:

@@ -8,14 +8,14 @@ from colibri.common.process.arguments import ArgumentParser, positive
 
 def add_options(parser: ArgumentParser) -> None:
     add = parser.value
-    add(
+    parser.several(
         "--only",
         "PART",
-        "stages: each stage of a control step; flights: times real time at several rates; "
-        "sensors: the estimator, and flights on sensors beside those on the state; simulators: the plant answering "
-        "PX4 and ArduPilot; ground: serving ground stations, and the control step beside it; commands: whole ones, "
-        "beside their goals; may be repeated (default: all)",
-        action="append",
+        "stages: each stage of a control step; flights: times real time at several rates; sensors: the "
+        "estimator, and flights on sensors beside those on the state; simulators: the plant answering PX4 and "
+        "ArduPilot; ground: serving ground stations, and the control step beside it; commands: whole ones, "
+        "beside their goals",
+        "all",
         choices=("stages", "flights", "sensors", "simulators", "ground", "commands"),
     )
     add("--runs", "N", "flights of each kind (default 3)", type=int, default=3, choices=range(1, 101))

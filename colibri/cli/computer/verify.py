@@ -23,7 +23,7 @@ def add_options(parser: ArgumentParser) -> None:
         const=GOLDEN_HASHES,
     )
     parser.flag("--renew", "with --golden: write the hashes to FILE, and show which have changed")
-    add("--only", "NAME", "with --golden: only this flight; may be repeated", action="append", default=[])
+    parser.several("--only", "NAME", "with --golden: only this flight")
     add_out(parser, "out/verify", "the logs")
 
 

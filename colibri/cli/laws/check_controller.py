@@ -13,13 +13,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--vehicle", "NAME", "vehicle name or .toml (default: the profile's)")
     add("--seed", "N", "seed of everything random (default %(default)s)", type=natural, default=0)
     add("--duration", "S", "simulated time to fly each of the thesis's tracks", type=positive, default=30.0)
-    add(
-        "--only",
-        "AREA",
-        "try only this: interface, memory, limits, optional, time, flights or restart; may be repeated",
-        action="append",
-        default=[],
-    )
+    parser.several("--only", "AREA", "try only this: interface, memory, limits, optional, time, flights or restart")
     parser.flag("--quiet", "print failed checks only")
 
 

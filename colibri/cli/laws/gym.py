@@ -15,14 +15,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("action", choices=["export"], help="write POLICY.toml beside a policy")
     add("policy", "POLICY.onnx", "a model from observations, (1, n), to actions, (1, a)", type=Path)
     add("--env", "NAME", "where it has learned", default="colibri/Hover-v0")
-    add(
-        "--set",
-        "KEY=VALUE",
-        "a keyword of the environment; may be repeated",
-        type=_keyword,
-        action="append",
-        default=[],
-    )
+    parser.several("--set", "KEY=VALUE", "a keyword of the environment", type=_keyword)
 
 
 def run(args: Namespace) -> int:

@@ -20,14 +20,12 @@ def add_engine(parser: ArgumentParser) -> None:
 
 def add_gate(parser: ArgumentParser, lost: LossLimit | None) -> None:
     """Add what continuous integration needs; `lost` is the default of `--fail-lost`."""
-    parser.value(
+    parser.several(
         "--fail-above",
         "[KEY=]VALUE",
-        "exit with 1 if a number of report.json is larger: rmse_after_20s_m (m), or another by its "
-        "KEY, for example ground_contact_s=0; may be repeated",
+        "exit with 1 if a number of report.json is larger: rmse_after_20s_m (m), or another by its KEY, for "
+        "example ground_contact_s=0",
         type=limit,
-        action="append",
-        default=[],
     )
     parser.value(
         "--fail-lost",
