@@ -20,12 +20,8 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add("--runs", "N", "flights of each kind (default 3)", type=int, default=3, choices=range(1, 101))
     add("--duration", "S", "simulated time of a flight, but of the thesis's spiral", type=positive, default=10.0)
-    add(
-        "--against",
-        "FOLDER",
-        "another checkout that is set up: have it run the whole commands in turn with this one",
-        type=Path,
-    )
+    against = "another checkout that is set up: have it run the whole commands in turn with this one"
+    add("--against", "FOLDER", against, type=Path)
     add("--out", "FILE", "write the figures as JSON there", type=Path)
 
 

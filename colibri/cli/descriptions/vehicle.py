@@ -16,24 +16,16 @@ def add_options(parser: ArgumentParser) -> None:
     add = parser.value
     add("name", "NAME", "vehicle name or .toml; or new: write the file of a new vehicle")
     add("new_name", "NEW", "of new: its name", nargs="?")
-    parser.add_argument(
-        "--for",
-        choices=("px4", "ardupilot"),
-        dest="whom",
-        help="px4: a file that QGroundControl loads; ardupilot: one that SITL, MAVProxy and Mission Planner load",
-    )
+    loaded_by = "px4: a file that QGroundControl loads; ardupilot: one that SITL, MAVProxy and Mission Planner load"
+    parser.add_argument("--for", choices=("px4", "ardupilot"), dest="whom", help=loaded_by)
     add("--out", "FILE", "where to write (default: standard output; of new, NEW.toml)", type=Path)
     add("--mass", "KG", "of new: ready to fly, with battery", type=float)
     add("--arm", "M", "of new: from the centre to a motor", type=float)
     add("--wheelbase", "M", "of new: from motor to opposite motor, in place of --arm", type=float)
     layouts = "x, + or h (x, turning the other way), hexa-x, hexa-+, octo-x, octo-+, x8 or y6"
     add("--layout", "NAME", f"of new: {layouts} (default x)", default="x")
-    parser.add_argument(
-        "--order",
-        choices=("px4", "clockwise"),
-        default="px4",
-        help="of new: order of the rotors; clockwise: from the front (right) on (default px4, as ArduPilot's)",
-    )
+    order = "of new: order of the rotors; clockwise: from the front (right) on (default px4, as ArduPilot's)"
+    parser.add_argument("--order", choices=("px4", "clockwise"), default="px4", help=order)
     add("--propeller", "SIZE", "of new: inches as 10x4.5 or 1045, or millimetres as 45mm")
     parser.add_argument(
         "--motor", choices=("brushless", "brushed"), help="of new: required for one cell and below 60 mm"

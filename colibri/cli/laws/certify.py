@@ -27,13 +27,8 @@ def add_options(parser: ArgumentParser) -> None:
     add("--vehicle", "NAME", "vehicle name or .toml (default: the profile's)")
     add("--moment", "NM", "moment that disturbs, N m", type=positive, default=0.01)
     add("--charge", "PART", "part of the battery's charge that may be taken", type=part, default=0.5)
-    add(
-        "--least",
-        "PART",
-        "refuse a law without Lyapunov function over this part of the profile's ranges",
-        type=part,
-        default=0.5,
-    )
+    least = "refuse a law without Lyapunov function over this part of the profile's ranges"
+    add("--least", "PART", least, type=part, default=0.5)
     add("--flights", "N", "flights from the set's border", type=some, default=1000)
     add("--seed", "N", "seed of the flights (default %(default)s)", type=natural, default=0)
     add_out(parser, "out/certify", "certificate, table and figure")

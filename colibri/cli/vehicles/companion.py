@@ -14,12 +14,8 @@ def add_options(parser: ArgumentParser) -> None:
     mission = "or FILE.plan, a mission of QGroundControl: its waypoints, from the vehicle's home"
     hover = "what hover leaves out is as the vehicle has it"
     add("track", "TRACK", f"{TRACK_HELP}; {mission}; {hover}", nargs="?")
-    add(
-        "--vehicle",
-        "URL",
-        "how the vehicle is reached: udpin:, udpout:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD",
-        required=True,
-    )
+    reached = "how the vehicle is reached: udpin:, udpout:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD"
+    add("--vehicle", "URL", reached, required=True)
     add("--system", "ID", "MAVLink system id, where several are on the link", type=natural, default=0)
     add("--model", "NAME", "vehicle name or .toml that describes it (default: the profile's)")
     add("--profile", "NAME", "control profile name or .toml", default="flight")
@@ -28,11 +24,8 @@ def add_options(parser: ArgumentParser) -> None:
     parser.flag("--dry-run", "ask, compute and log, but send neither setpoints nor orders")
     parser.flag("--identify", "hover, and measure in small steps how body rates follow commands")
     add("--response", "FILE", "companion.toml of an earlier --identify")
-    parser.add_argument(
-        "--stack",
-        choices=("px4", "ardupilot", "colibri"),
-        help="autopilot of the vehicle (default: as in its heartbeat)",
-    )
+    stacks = ("px4", "ardupilot", "colibri")
+    parser.add_argument("--stack", choices=stacks, help="autopilot of the vehicle (default: as in its heartbeat)")
     parser.add_argument(
         "--setpoints",
         default="rates",
@@ -46,13 +39,8 @@ def add_options(parser: ArgumentParser) -> None:
     add("--max-tilt", "DEG", "ends the flight (default %(default)g)", type=positive, default=50.0)
     add("--max-error", "M", "from the reference (default %(default)g)", type=positive, default=1.5)
     add("--max-age", "MS", "of the newest state; ends the flight (default %(default)g)", type=positive, default=100.0)
-    add(
-        "--min-pace",
-        "PERCENT",
-        "of the setpoints over a second, by a computer that keeps up; fewer end the flight (default %(default)g)",
-        type=positive,
-        default=80.0,
-    )
+    pace = "of the setpoints over a second, by a computer that keeps up; fewer end the flight (default %(default)g)"
+    add("--min-pace", "PERCENT", pace, type=positive, default=80.0)
     add("--max-gap", "MS", "between two setpoints; ends the flight (default %(default)g)", type=positive, default=200.0)
     add_signing(parser)
     add_out(parser, "out/companion", "logs and report")
