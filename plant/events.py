@@ -223,10 +223,7 @@ def _number(enum: str, given: str) -> int:
     return found
 
 
-_OF_PLANT = {
-    "FAILURE_UNIT": {unit for unit, _ in faults.TABLE},
-    "FAILURE_TYPE": {kind for _, kind in faults.TABLE},
-}
+_OF_PLANT = {"FAILURE_UNIT": {unit for unit, _ in faults.TABLE}, "FAILURE_TYPE": {kind for _, kind in faults.TABLE}}
 
 
 def plant_events(events: Iterable[Event]) -> tuple[PlantEvent, ...]:

@@ -23,11 +23,7 @@ class LoadedTrack(NamedTuple):
 
 
 def load_track(
-    given: str | Trajectory,
-    vehicle: Vehicle,
-    profile: Profile,
-    floor_m: float | None = None,
-    text: str | None = None,
+    given: str | Trajectory, vehicle: Vehicle, profile: Profile, floor_m: float | None = None, text: str | None = None
 ) -> LoadedTrack:
     """Load a track for a vehicle; waypoint tracks are adapted to its limits, others are flown unchanged.
 

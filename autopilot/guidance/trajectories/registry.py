@@ -12,13 +12,7 @@ import numpy as np
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.taylor import in_series
-from colibri.autopilot.guidance.trajectories.tracks import (
-    OPTIONS,
-    THESIS_TRACKS,
-    FileOptions,
-    Track,
-    TrackOptions,
-)
+from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, FileOptions, Track, TrackOptions
 from colibri.common.errors import Error, checked, unknown
 
 GROUP = "colibri.tracks"
