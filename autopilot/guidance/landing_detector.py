@@ -79,7 +79,7 @@ class Lack(NamedTuple):
         return Lack(lack_s, self.climb_m_s if self.lack_s and lack_s else climb_m_s, climb_m_s)
 
     def is_carried(self, climb_m_s: float) -> bool:
-        """Whether the ground carries the vehicle: it lacks lift for long, or for a shorter time without a falling climb rate."""
+        """Whether the ground carries the vehicle: it lacks lift for long, or for less long without falling faster."""
         falls = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s
         return self.lack_s >= (_UNCARRIED_S if falls else _UNCARRIED_STILL_S)
 
