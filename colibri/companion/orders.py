@@ -48,12 +48,7 @@ class Orders:
     @property
     def held(self) -> bool:
         stack = self._peer.stack
-        if stack is None:
-            return False
-        return any(
-            self._peer.results.get(f"mode {mode.name}") == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
-            for mode in (stack.hold, stack.last_resort)
-        )
+        return stack is not None and (self._taken(stack.hold) or self._taken(stack.last_resort))
 
     def enter(self, phase: CompanionPhase, before: CompanionPhase) -> None:
         stack = self._peer.stack
@@ -122,10 +117,12 @@ class Orders:
         self.height_enu_m = ground_enu_m + self._climb_m
 
     def _mode(self, mode: FlightMode) -> None:
-        name = f"mode {mode.name}"
-        taken = self._peer.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
-        if not taken:
-            self._repeat(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
+        if not self._taken(mode):
+            self._repeat(f"mode {mode.name}", mav.MAV_CMD_DO_SET_MODE, *mode.command)
+
+    def _taken(self, mode: FlightMode) -> bool:
+        accepted = self._peer.results.get(f"mode {mode.name}") == RESULT_ACCEPTED
+        return accepted and self._peer.report.mode == mode.custom
 
     def _once(self, name: str, number: int, *params: float) -> None:
         result = self._peer.results.get(name)

@@ -50,9 +50,7 @@ class VehiclePeer:
         self._streams: list[Command] = []
         self._parameters: list[ReadParameter] | None = None
         self._states = StateAssembler()
-        self._renew_at_us = 0
-        self._version_at_us = 0
-        self._version_tries = 0
+        self._renew_at_us = self._version_at_us = self._version_tries = 0
         self._arrivals_us: deque[int] = deque()
         self._delays_us: deque[int] = deque(maxlen=_REMEMBERED_DELAYS)
 

@@ -76,8 +76,7 @@ class Subject:
     def script(self, code: str, *names: str) -> str:
         """Return Python with imports, as a shell command if possible."""
         code = f"from {_MODULE} import {', '.join(names)}; {code}"
-        by_name = all(isinstance(value, str) for value in self.given.values())
-        if not by_name:
+        if not all(isinstance(value, str) for value in self.given.values()):
             return code
         return f"python -c {quote(code)}" if _SHELLS & set(code) else f'python -c "{code}"'
 
@@ -96,10 +95,8 @@ def built(*, controller: Any, profile: Any = None, vehicle: Any = None) -> Contr
 
 def profile_for(controller: str) -> str:
     """Return the law's own profile, else one with its numbers, else the default."""
-    profiles, controller = (
-        {name: load_profile(name) for name in [_DEFAULT_PROFILE, *profile_names()]},
-        table_of(controller),
-    )
+    profiles = {name: load_profile(name) for name in [_DEFAULT_PROFILE, *profile_names()]}
+    controller = table_of(controller)
     own = [name for name, profile in profiles.items() if profile.controller == controller]
     known = [name for name, profile in profiles.items() if controller in profile.controllers]
     return next(iter([*own, *known, _DEFAULT_PROFILE]))
