@@ -165,7 +165,8 @@ def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tup
         places = flights.keep(folder, title=item.nodeid, reason=reason)
     except (Exception, SystemExit) as error:  # whatever it is, the test's own failure must be reported
         return [], f"could not keep {folder}: {error}\n{again}"
-    shown = [_as_given(item.config, place) for place in places]
+    keep = Path(item.config.getoption("--sitl-keep"))
+    shown = [keep / place.relative_to(item.config.invocation_params.dir / keep) for place in places]
     return shown, "\n".join([*(f"flight kept in {place}" for place in shown), again])
 
 
@@ -278,11 +279,6 @@ def _folder(item: pytest.Item) -> Path:
         name = f"{name[9 - _MAX_NAME :]}-{sha256(item.nodeid.encode()).hexdigest()[:8]}"
     keep: str = item.config.getoption("--sitl-keep")
     return item.config.invocation_params.dir / keep / name
-
-
-def _as_given(config: pytest.Config, place: Path) -> Path:
-    keep = Path(config.getoption("--sitl-keep"))
-    return keep / place.relative_to(config.invocation_params.dir / keep)
 
 
 def _forget(folder: Path) -> None:

@@ -1,7 +1,7 @@
 """Table and figure of an arena, with published values."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -24,7 +24,6 @@ from colibri.campaigns.figure import COLORS, make_room_for_names
 from colibri.campaigns.flights import Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.results import CampaignResults
-from colibri.plant.vehicle.description import Vehicle
 
 CAP_M = LOST_M
 """Errors of a lost flight."""
@@ -109,7 +108,8 @@ class ArenaResults(CampaignResults):
         """Return rate, preview, lost flights and errors of each law."""
         lines: list[Cells] = []
         for level in self.campaign.grid["law"]:
-            law = build_law(level.settings, self.arena.vehicle())
+            spec, vehicle = LawSpec(**level.settings), self.arena.vehicle()
+            law = build_controller(spec.chosen(load_profile(spec.profile)), vehicle, perf_counter, spec.law)
             cells = [cell for (name, _), cell in self.cells.items() if name == level.name]
             if not cells:
                 continue
@@ -208,8 +208,3 @@ class ArenaResults(CampaignResults):
         """Yield each law with its colour and the rows that it has flown."""
         for number, law in enumerate(dict.fromkeys(law for law, _ in self.cells)):
             yield law, COLORS[number % len(COLORS)], [row for row in rows if (law, row) in self.cells]
-
-
-def build_law(settings: Mapping[str, Any], vehicle: Vehicle) -> Any:
-    spec = LawSpec(**settings)
-    return build_controller(spec.chosen(load_profile(spec.profile)), vehicle, perf_counter, spec.law)

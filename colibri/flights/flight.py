@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SYSTEM_ID = 1
 NEVER_LATE_S = 0.0
-_ADDRESS: Address = ("memory", 0)
+MEMORY_ADDRESS: Address = ("memory", 0)
 StagesT = TypeVar("StagesT", bound=Stages)
 Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 """Records frames of MAVLink: (simulated time in µs, frames)."""
@@ -166,7 +166,7 @@ class InMemory:
     def _to_plant(self, now_us: int) -> ActuatorCommand | None:
         command = None
         for datagram in self.carried_down(self.autopilot_end.take_outbox()):
-            command = self.plant_end.receive(datagram, _ADDRESS, NEVER_LATE_S) or command
+            command = self.plant_end.receive(datagram, MEMORY_ADDRESS, NEVER_LATE_S) or command
         if self._traffic is not None:
             self._traffic(now_us, list(self.plant_end.received))
         self.plant_end.received.clear()

@@ -37,7 +37,11 @@ def export_policy(path: str | Path, env: Any, layers: Layers | None = None) -> P
     if layers is not None:
         path.write_bytes(_model(layers))
     table = path.with_suffix(".toml")
-    law = OnnxLaw(OnnxFile(str(path), _read(path), inputs), {}, episodes.vehicle, lambda: 0.0)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise GymError(f"{path}: {error.strerror}") from error
+    law = OnnxLaw(OnnxFile(str(path), content, inputs), {}, episodes.vehicle, lambda: 0.0)
     law.act(np.zeros(episodes.observations.shape[1], dtype=np.float32))
     lines = [f"{key} = {msgspec.json.encode(value).decode()}" for key, value in msgspec.structs.asdict(inputs).items()]
     table.write_text("\n".join([_HEAD.format(path.name), *lines, ""]), encoding="utf-8")
@@ -58,13 +62,6 @@ def _inputs(episodes: Episodes) -> PolicyInputs:
     preview, history = episodes.preview, episodes.history
     times = {"interval_ms": round(ms), "preview_ms": round(preview_ms)}
     return PolicyInputs(action=kind, preview=preview, history=history, max_rates_rad_s=(p, q, r), **times)
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise GymError(f"{path}: {error.strerror}") from error
 
 
 def _model(layers: Layers) -> bytes:

@@ -6,13 +6,6 @@ from colibri.analysis.limits import LossLimit, limit, loss_limit
 from colibri.common.process.arguments import ArgumentParser
 
 
-def add_signing(parser: ArgumentParser) -> None:
-    parser.value(
-        "--signing-key", "FILE", "sign messages, and refuse messages without a signature of this key", type=Path
-    )
-    parser.flag("--insecure", "let links leave this computer without a key")
-
-
 def add_engine(parser: ArgumentParser) -> None:
     parser.value("--workers", "N", "processes (default: one a core)", type=int)
     parser.value("--dask", "ADDRESS", "fly on a cluster: address of its Dask scheduler, for example tcp://HOST:8786")

@@ -2,8 +2,9 @@
 
 from argparse import Namespace
 from math import inf
+from pathlib import Path
 
-from colibri.cli.shared.options import add_out, add_signing
+from colibri.cli.shared.options import add_out
 from colibri.common.process.arguments import ArgumentParser, natural, positive
 from colibri.common.process.lifecycle import loading
 from colibri.flights.spec import TRACK_HELP
@@ -42,7 +43,9 @@ def add_options(parser: ArgumentParser) -> None:
     pace = "of the setpoints over a second, by a computer that keeps up; fewer end the flight (default %(default)g)"
     add("--min-pace", "PERCENT", pace, type=positive, default=80.0)
     add("--max-gap", "MS", "between two setpoints; ends the flight (default %(default)g)", type=positive, default=200.0)
-    add_signing(parser)
+    key = "sign messages, and refuse messages without a signature of this key"
+    add("--signing-key", "FILE", key, type=Path)
+    parser.flag("--insecure", "let links leave this computer without a key")
     add_out(parser, "out/companion", "logs and report")
 
 

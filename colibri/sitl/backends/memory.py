@@ -8,7 +8,7 @@ from colibri.autopilot.process.ground import GroundService
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.errors import Error
 from colibri.common.process.status import Silent
-from colibri.common.types import Address
+from colibri.flights.flight import MEMORY_ADDRESS, NEVER_LATE_S
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -21,9 +21,6 @@ from colibri.sitl.backends.lockstep import LinkClock, SessionError, StoppedClock
 from colibri.sitl.backends.setting import SettingError
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
-
-NEVER_LATE_S = 0.0
-_ADDRESS: Address = ("memory", 0)
 
 
 class MemoryPlant:
@@ -44,7 +41,7 @@ class MemoryPlant:
         self.clock: LinkClock = clock or StoppedClock()
 
     def receive(self, datagram: bytes) -> None:
-        command = self._end.receive(datagram, _ADDRESS, self.clock.now_s())
+        command = self._end.receive(datagram, MEMORY_ADDRESS, self.clock.now_s())
         self._end.received.clear()
         if command is None:
             return
