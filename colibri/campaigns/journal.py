@@ -28,7 +28,7 @@ class Journal:
         self._file: IO[bytes] = open(folder / file, "ab", opener=regular)  # noqa: SIM115
 
     def add(self, flown: FlightResult) -> None:
-        """Write a flight's logs, then its line, and flush it to disk."""
+        """Write a flight's logs, then its line, to disk."""
         keep_files(self._folder, flown)
         kept = flown._replace(files={})
         self._file.write(msgspec.json.encode(kept[:-1]) + b"\n")

@@ -36,7 +36,7 @@ class Severity(StrEnum):
 
 
 class Finding(NamedTuple):
-    """The finding of a check, with advice unless all is well."""
+    """What a check has found, with advice unless all is well."""
 
     checked: str
     verdict: Severity

@@ -72,7 +72,7 @@ RULES: tuple[tuple[str, str, Callable[[FlownOptions], bool]], ...] = (
 
 
 def without_effect(setting: FlownOptions) -> dict[str, str]:
-    """Return the options given without effect, and the reason of each."""
+    """Return the reason of each option without effect."""
     known = fields_of(type(setting.spec))
     given = {name for name, field in known.items() if getattr(setting.spec, name) != field.default}
     lacking = (rule for rule in RULES if rule[0] in given and not rule[2](setting))

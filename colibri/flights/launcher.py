@@ -157,7 +157,7 @@ def _use_safe_path() -> None:
 
 
 def events_of(children: Iterable[Child]) -> Iterator[tuple[Child, dict[str, Any]]]:
-    """Yield the events that children have printed, waiting a moment for them."""
+    """Yield the events that children print within a moment."""
     streams = {child.stdout: child for child in children if child.stdout is not None}
     ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
     for stream in ready:

@@ -257,7 +257,6 @@ class Episodes:
         return {"why": ENDS[self._ends[0]]} if self._ends[0] else {}
 
     def why(self, n: int) -> str:
-        """Return the reason of a row's termination, or an empty text."""
         return ENDS[self._ends[n]]
 
     def snapshot(self) -> EpisodesSnapshot:

@@ -66,7 +66,7 @@ class Picture:
 
 
 class LivePage:
-    """Shows an episode in a browser as it is stepped, at most at real time."""
+    """Shows an episode in a browser, at most at real time."""
 
     def __init__(self, episodes: Episodes) -> None:
         self._episodes, self._codec = episodes, Codec(1, 1)

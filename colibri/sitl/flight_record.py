@@ -64,7 +64,6 @@ class Record:
         self.frames += 1
 
     def note(self, time_us: int, datagram: bytes) -> None:
-        """Record a datagram on a link to a ground station."""
         self._ground.append((time_us, datagram))
 
     @property

@@ -105,7 +105,6 @@ class Station(Inbox):
                 self.add(message)
 
     def add(self, message: Message) -> None:
-        """Record a message of the vehicle."""
         super().add(message)
         if message.name == "PARAM_VALUE":
             self._kinds[message.fields.param_id] = message.fields.param_type

@@ -65,7 +65,6 @@ class Flights:
         return LockstepSession(plant, autopilot, setting.system, setting.rotors, setting.seed)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
-        """Write records, figures and facts below `folder`; return the folders."""
         places = []
         for number, sitl in enumerate(self.flown):
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder
@@ -120,7 +119,6 @@ class Fleet(tuple[Sitl, ...], Stepped):
         return min(sitl.time_us for sitl in self)
 
     def step(self) -> None:
-        """Fly one frame."""
         min(self, key=lambda sitl: sitl.time_us).step()
 
     def __str__(self) -> str:

@@ -28,7 +28,7 @@ Results: TypeAlias = Generator[tuple[Job, Result | Killed], None, None]
 
 
 class Engine(Protocol):
-    """Runs many jobs at once; a remote one on other computers."""
+    """Runs many jobs at once, a remote one on other computers."""
 
     is_remote: bool
 

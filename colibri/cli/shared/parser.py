@@ -31,7 +31,7 @@ class Version(Action):
 
 
 class _Grouped(RawDescriptionHelpFormatter):
-    """Help with the subcommands in groups at the end only."""
+    """Help with the subcommands at the end only, in groups."""
 
     def _iter_indented_subactions(self, _action: Action) -> Generator[Action, None, None]:
         yield from ()

@@ -74,7 +74,6 @@ class LoggedChild:
         self._ask("kill")
 
     def _ask(self, what: Literal["code", "kill"]) -> int | None:
-        """Return the exit code, `None` while it runs."""
         if self._child is None:
             self._code = self._launcher.request(what, str(self.number)) if self._code is None else self._code
             return self._code

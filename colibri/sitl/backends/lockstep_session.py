@@ -56,7 +56,7 @@ class LockstepSession:
         self.flown = Instant(self.truth, still, StepMessage(0, ()), b"", b"")
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
-        """Fly one frame; frames `injected` are added to the autopilot's answer."""
+        """Fly one frame; `injected` frames join the autopilot's answer."""
         frame, began = self._frame, self.truth
         step_message = StepMessage(began.time_us, parcels)
         self.autopilot.expect(step_message)

@@ -77,7 +77,7 @@ class MemoryPlant:
 
 
 class MemoryAutopilot:
-    """An autopilot in this process; `autopilot` is a new one after a restart."""
+    """An autopilot in this process; a new one after a restart."""
 
     process = None
 
