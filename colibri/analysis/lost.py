@@ -17,7 +17,7 @@ _TOUCHED_S = 1.0
 """Longest contact with the ground below the reference."""
 _LAST_PART = 2.0 / 3.0
 LIMIT_CYCLE_RAD_S = 1.5
-"""A swing above it is a limit cycle; slow rotors cause 3 to 8 rad/s."""
+"""A swing above it is a limit cycle; rotors slower than assumed cause 3 to 8 rad/s."""
 _TURNING_S = 1.0
 """A recovery may be upside down for so long."""
 _INSTANT_S = 1e-6

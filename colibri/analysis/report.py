@@ -30,7 +30,7 @@ _INSTANT_S = 1e-6
 def report(
     plan: FlightPlan, log: TopicReader, summary: FrameCount | None, flight: FlightSeries, lost: Lost | None
 ) -> Report:
-    """Return the figures of a flight; errors are at the same instant or path time."""
+    """Return the figures of a flight; errors are at the same instant or path time, effort is the RMS of U2..U4."""
     wall_time_s, frames, resent = summary or (None, None, None)
     error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])

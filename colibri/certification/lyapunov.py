@@ -76,7 +76,7 @@ _LEAST_MARGIN = 1e-6
 _BISECTIONS = 6
 _SET_RATIOS = (0.98, 0.95, 0.99)
 _ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)
-"""Ratios of V, in order of trial: larger sets, then faster."""
+"""Ratios of V between samples, in order of trial; slower decay gives larger sets."""
 _STAGE_BESIDE = 1e-6
 """Covers states without stage cost."""
 _ROUNDING = 1e-6

@@ -96,7 +96,7 @@ def as_flown(values: Range, value: Any) -> Any:
 
 SHARE_LOST = "share_lost"
 LOST_COUNTS = 10.0
-"""How many of the largest original value a lost flight counts."""
+"""A lost flight counts this many times the largest original value."""
 _POOLINGS = ("mean", "rms", "median", "largest")
 _NOT_SMALL = ("lost_at_s",)
 

@@ -25,7 +25,7 @@ CRITICAL = frozenset({5, 6, 7, 8})
 
 
 class Age(NamedTuple):
-    """A report, its messages, and its largest age, s; without a `needed` one nothing is flown."""
+    """A report, its messages, and its largest age at the start and in flight, s; a `needed` one is required."""
 
     name: str
     messages: str
