@@ -13,9 +13,8 @@ _WAIT_S = 0.02
 
 
 class LiveVehicle:
-    """The vehicle at the other end of a link; a `Source` without airframe."""
+    """The vehicle at the other end of a link; its airframe is drawn by the number of rotors alone."""
 
-    airframe = VehicleShape()
     is_live = True
 
     def __init__(self, url: str, name: str = "") -> None:
@@ -46,6 +45,11 @@ class LiveVehicle:
         """MAV_AUTOPILOT; `None` before the first heartbeat."""
         with self._lock:
             return self._observer.telemetry.autopilot
+
+    @property
+    def airframe(self) -> VehicleShape:
+        with self._lock:
+            return VehicleShape.of(self._observer.telemetry.rotors)
 
     def at(self, time_s: float) -> Snapshot:
         with self._lock:

@@ -31,6 +31,15 @@ class VehicleShape(NamedTuple):
     spins: PerRotor = (1.0, 1.0, -1.0, -1.0)
     foot_m: float = 0.1
 
+    @classmethod
+    def of(cls, rotors: int) -> "VehicleShape":
+        """Return four rotors (0: unknown), or others in a circle."""
+        if rotors in (0, len(cls().rotors_m)):
+            return cls()
+        angles = 2.0 * np.pi * (0.5 - np.arange(rotors)) / rotors
+        places = 0.24 * max(rotors / 4.0, 1.0) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return cls(tuple((x, y) for x, y in places.tolist()), tuple((-1.0) ** rotor for rotor in range(rotors)))
+
     @property
     def radius_m(self) -> float:
         """Radius of a rotor's disc: neighbours almost touch."""
@@ -124,7 +133,9 @@ class Source(Protocol):
     """
 
     name: str
-    airframe: VehicleShape
+
+    @property
+    def airframe(self) -> VehicleShape: ...
 
     @property
     def is_live(self) -> bool: ...

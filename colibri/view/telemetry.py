@@ -1,6 +1,7 @@
 """The state of a live vehicle from its messages."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 from math import isfinite, isnan, nan, pi
@@ -10,11 +11,11 @@ import numpy as np
 
 from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
 from colibri.common.rotations import quaternion_from_euler, tilt_deg
-from colibri.common.types import PerRotor, Quaternion, Vector
+from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.client.modes import mode_name
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import Message, mav, rotors_of
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
-from colibri.view.snapshot import NO_POINTS, NOWHERE, UNKNOWN_ROTORS, Chart, Snapshot
+from colibri.view.snapshot import NO_POINTS, NOWHERE, Chart, Snapshot
 
 CHART_S = 60.0
 TRAIL_POINTS = 600
@@ -24,12 +25,13 @@ _STALE_S = 3.0
 """Age from which values are hidden."""
 _PULSE_US = (1000.0, 2000.0)
 _E7 = 1e7
+_USUAL_ROTORS, _MOST_ROTORS = 4, 8
 _ROTORS = "rotors, % of the largest"
 _ROTOR_LIMITS = {"(stopped)": 0.0, "(largest)": 100.0}
-_CHARTS = (
+_CHARTS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("position error, m", ("error",)),
     ("tilt, deg", ("tilt",)),
-    (_ROTORS, ("1", "2", "3", "4")),
+    (_ROTORS, ("1", "2", "3", "4", "5", "6", "7", "8")),
     ("active constraints", ("rotors", "increments", "angles", "rates")),
     ("QP time, ms", ("QP",)),
     ("estimated accuracy, m", ("horizontal", "vertical")),
@@ -38,9 +40,10 @@ _CHARTS = (
 
 
 class Telemetry:
-    """The latest state; `system` is 0 before the first heartbeat."""
+    """The latest state; `system` and `rotors` are 0 before the first heartbeat."""
 
     def __init__(self) -> None:
+        self.rotors = 0
         self.autopilot: int | None = None
         self.system = 0
         self.origin: Geodetic | None = None
@@ -60,6 +63,7 @@ class Telemetry:
         match message.name:
             case "HEARTBEAT":
                 self.autopilot = int(fields.autopilot)
+                self.rotors = self.rotors or rotors_of(fields.type) or _USUAL_ROTORS
                 self._set("armed", now_s, bool(fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED))
                 self._set("mode", now_s, mode_name(self.autopilot, fields.custom_mode))
             case "LOCAL_POSITION_NED":
@@ -81,10 +85,10 @@ class Telemetry:
             case "POSITION_TARGET_LOCAL_NED":
                 self._target(fields, now_s)
             case "SERVO_OUTPUT_RAW":
-                pulses = (fields.servo1_raw, fields.servo2_raw, fields.servo3_raw, fields.servo4_raw)
+                pulses = [getattr(fields, f"servo{rotor}_raw") for rotor in range(1, self.rotors + 1)]
                 self._pulses(pulses, now_s)
             case "ACTUATOR_OUTPUT_STATUS":
-                self._pulses(tuple(fields.actuator[:4]), now_s)
+                self._pulses(fields.actuator[: self.rotors], now_s)
             case "TRAJECTORY_REPRESENTATION_WAYPOINTS":
                 rows = zip(fields.pos_x, fields.pos_y, fields.pos_z, strict=True)
                 points = [ned_from_enu(row) for row in islice(rows, min(fields.valid_points, 5))]
@@ -115,7 +119,7 @@ class Telemetry:
             position_enu_m=place,
             attitude=now.attitude,
             velocity_enu_m_s=now.velocity_enu_m_s,
-            rotors=self._fresh("rotors", now_s, UNKNOWN_ROTORS),
+            rotors=self._fresh("rotors", now_s, (nan,) * (self.rotors or _USUAL_ROTORS)),
             reference_enu_m=self._reference() if now_s - self._moved_s < _STALE_S else NOWHERE,
             trail=np.array([*self._trail]) if self._trail else NO_POINTS,
             horizon=self._fresh("horizon", now_s, NO_POINTS),
@@ -135,6 +139,8 @@ class Telemetry:
         for title, names in _CHARTS:
             values = rows[:, at : at + len(names)]
             at += len(names)
+            if title == _ROTORS:
+                names, values = names[: self.rotors], values[:, : self.rotors]
             known = np.isfinite(values).all(axis=1)
             if known.sum() > 1:
                 shown = values[known]
@@ -174,7 +180,8 @@ class Telemetry:
 
     def _row(self, place: Vector, now_s: float) -> tuple[float, ...]:
         error = float(np.linalg.norm(np.subtract(place, self._reference())))
-        rotors = (100.0 * part for part in self._fresh("rotors", now_s, UNKNOWN_ROTORS))
+        rotors = [100.0 * part for part in self._fresh("rotors", now_s, ())]
+        rotors += [nan] * (_MOST_ROTORS - len(rotors))
         solver = self._fresh("solver", now_s, (nan,) * 5)
         accuracy = self._fresh("accuracy", now_s, (nan, nan))
         tilt = tilt_deg(self._now.attitude)
@@ -196,7 +203,7 @@ class Telemetry:
             velocity = ned_from_enu((fields.vx, fields.vy, fields.vz)) if moves else (0.0, 0.0, 0.0)
             self._set("reference", now_s, (ned_from_enu((fields.x, fields.y, fields.z)), velocity))
 
-    def _pulses(self, pulses: PerRotor, now_s: float) -> None:
+    def _pulses(self, pulses: Sequence[float], now_s: float) -> None:
         low, high = _PULSE_US
         if any(pulses):
             parts = tuple(min(max((pulse - low) / (high - low), 0.0), 1.0) for pulse in pulses)

@@ -50,6 +50,11 @@ CRC_BYTES = 2
 CRC_START = 0xFFFF
 
 
+def rotors_of(vehicle_type: int) -> int | None:
+    """Return how many rotors a MAV_TYPE has, if it is known."""
+    return next((rotors for rotors, kind in _TYPES.items() if kind == vehicle_type), None)
+
+
 def vehicle_type(rotors: int) -> int:
     """Return the MAV_TYPE of a multirotor."""
     return int(_TYPES.get(rotors, mav.MAV_TYPE_GENERIC_MULTIROTOR))

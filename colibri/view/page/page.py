@@ -88,8 +88,6 @@ class Page:
                 return
             if done.what == "scale":
                 self._scale = float(done.value)
-                for vehicle in self._vehicles:
-                    vehicle.remove()
                 self._vehicles = self._built() if self._vehicles else []
             elif done.what == "follow":
                 self._follows = bool(done.value)
@@ -100,6 +98,8 @@ class Page:
         if not self._vehicles:
             return
         layers = self.controls.layers
+        if any(len(now.rotors) != vehicle.rotors for vehicle, now in zip(self._vehicles, snapshots, strict=True)):
+            self._vehicles = self._built()
         with self.server.atomic():
             for vehicle, around, source, now in zip(
                 self._vehicles, self._around, self._sources, snapshots, strict=True
@@ -141,6 +141,8 @@ class Page:
 
     def _built(self) -> list[VehicleScene]:
         scene = self.server.scene
+        for vehicle in self._vehicles:
+            vehicle.remove()
         return [VehicleScene(scene, number, each.airframe, self._scale) for number, each in enumerate(self._sources)]
 
     def _look(self, middle: tuple[float, float, float], extent_m: float) -> None:

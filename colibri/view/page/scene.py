@@ -37,7 +37,8 @@ class VehicleScene:
         self._root = f"/world/{number}"
         self._airframe = airframe
         self._scale = scale
-        self._angles: PerRotor = (0.0,) * len(airframe.rotors_m)
+        self.rotors = len(airframe.rotors_m)
+        self._angles: PerRotor = (0.0,) * self.rotors
         self._time_s: float | None = None
         colour = COLOURS[number % len(COLOURS)]
         self._frame = scene.add_frame(self._root, show_axes=False)

@@ -13,7 +13,7 @@ from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.sitl.mission_items import land, takeoff, waypoint
 from colibri.sitl.vehicle import Sitl
 from colibri.view.observer import CHOICES, COMPONENT, SYSTEM, VehicleObserver
-from colibri.view.snapshot import Snapshot
+from colibri.view.snapshot import Snapshot, VehicleShape
 from tools.pages.pictures.watched import watched
 
 HOME = Geodetic(47.0, 8.0, 400.0)
@@ -89,6 +89,22 @@ def test_a_foreign_vehicle_is_seen_by_its_common_messages(others: tuple[VehicleO
     assert now.texts == ("hello",)
     assert not len(now.horizon)
     assert observer.telemetry.snapshot(60.0).mode == "no heartbeat"
+
+
+def test_as_many_rotors_are_drawn_as_the_vehicle_has() -> None:
+    observer, codec = VehicleObserver(), Codec(1, 1)
+
+    def feed(time_s: float, name: str, *fields: Any) -> None:
+        observer.receive(codec.encode(name, *fields), time_s)
+
+    for time_s in (0.0, 0.1, 0.2, 0.3):
+        feed(time_s, "HEARTBEAT", mav.MAV_TYPE_HEXAROTOR, ARDUPILOT, 0x81, 4, mav.MAV_STATE_ACTIVE, 3)
+        feed(time_s, "SERVO_OUTPUT_RAW", 1000, 0, 1500, 1600, 1000, 2000, 1100, 1200, 0, 0)
+        feed(time_s, "LOCAL_POSITION_NED", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert observer.telemetry.snapshot(0.3).rotors == pytest.approx((0.5, 0.6, 0.0, 1.0, 0.1, 0.2))
+    chart = next(chart for chart in observer.telemetry.charts() if chart.title.startswith("rotors"))
+    assert chart.names[:6] == ("1", "2", "3", "4", "5", "6")
+    assert len(VehicleShape.of(6).rotors_m) == 6
 
 
 def test_a_fence_comes_item_by_item(others: tuple[VehicleObserver, Any]) -> None:

@@ -30,7 +30,6 @@ def watched(sitl: Sitl) -> VehicleObserver:
 class Watched:
     """A simulated flight as a live vehicle."""
 
-    airframe = VehicleShape()
     is_live = True
 
     def __init__(self, sitl: Sitl, name: str) -> None:
@@ -44,6 +43,10 @@ class Watched:
     @property
     def surroundings(self) -> Surroundings:
         return self._observer.surroundings
+
+    @property
+    def airframe(self) -> VehicleShape:
+        return VehicleShape.of(self._observer.telemetry.rotors)
 
     def at(self, time_s: float) -> Snapshot:
         return self._observer.telemetry.snapshot(time_s)
