@@ -44,6 +44,12 @@ _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
 _TESTED_MOTORS = range(1, 9)
+_ACCEPTED = (
+    *(mav.MAV_CMD_DO_SET_RELAY, mav.MAV_CMD_DO_REPEAT_SERVO, mav.MAV_CMD_DO_REPEAT_RELAY, mav.MAV_CMD_DO_SET_ROI),
+    *(mav.MAV_CMD_DO_SET_ROI_LOCATION, mav.MAV_CMD_DO_SET_ROI_NONE, mav.MAV_CMD_DO_MOUNT_CONTROL),
+    *(mav.MAV_CMD_DO_MOUNT_CONFIGURE, mav.MAV_CMD_DO_DIGICAM_CONTROL, mav.MAV_CMD_DO_GRIPPER, DO_AUX_FUNCTION),
+)
+"""Commands that are accepted and have no effect."""
 
 
 class CopterCommands(Commands):
@@ -125,30 +131,16 @@ class CopterCommands(Commands):
                 yield "Invalid FENCE_ALT_MAX value"
 
     def handlers(self) -> Mapping[int, Handler]:
-        done: Handler = lambda _: None  # noqa: E731
         return {
             **super().handlers(),
+            **dict.fromkeys(_ACCEPTED, lambda _: None),
             mav.MAV_CMD_NAV_VTOL_LAND: lambda _: self.select(Mode.LAND),
             mav.MAV_CMD_DO_FENCE_ENABLE: self._enable_fence,
             mav.MAV_CMD_DO_SET_SERVO: self._set_servo,
-            mav.MAV_CMD_DO_SET_RELAY: done,
-            mav.MAV_CMD_DO_REPEAT_SERVO: done,
-            mav.MAV_CMD_DO_REPEAT_RELAY: done,
             mav.MAV_CMD_DO_MOTOR_TEST: self._test_motors,
-            mav.MAV_CMD_DO_SET_ROI: done,
-            mav.MAV_CMD_DO_SET_ROI_LOCATION: done,
-            mav.MAV_CMD_DO_SET_ROI_NONE: done,
-            mav.MAV_CMD_DO_MOUNT_CONTROL: done,
-            mav.MAV_CMD_DO_MOUNT_CONFIGURE: done,
-            mav.MAV_CMD_DO_DIGICAM_CONTROL: done,
-            mav.MAV_CMD_DO_GRIPPER: done,
-            DO_AUX_FUNCTION: done,
             mav.MAV_CMD_DO_JUMP_TAG: self._jump_to_tag,
             DO_SEND_BANNER: self._send_banner,
         }
-
-    def select(self, mode: Mode) -> Refusal | None:
-        return self.modes.command(mode)
 
     def _arm_disarm(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 1.0 and command.p2 in _ARM_FORCE:

@@ -40,10 +40,8 @@ class BatteryMonitor:
 
     def adopt(self, parameters: Parameters) -> None:
         """Have the voltage of SIM_BATT_VOLTAGE, once that is set."""
-        if _VOLTAGE in parameters and parameters[_VOLTAGE] != parameters.default(_VOLTAGE):
-            self._simulated_v = float(parameters[_VOLTAGE])
-        elif self._simulated_v is not None:
-            self._simulated_v = None
+        is_set = _VOLTAGE in parameters and parameters[_VOLTAGE] != parameters.default(_VOLTAGE)
+        self._simulated_v = float(parameters[_VOLTAGE]) if is_set else None
 
     def receive(self, reported: PlantBattery) -> None:
         if not reported.exists:

@@ -5,7 +5,6 @@ from colibri.mavlink.wire.refusal import Refusal
 
 _STEP_US = 100_000
 _STEPS = 10
-_KINDS = {"gyro": 2, "mag": 2, "accel": 2, "level": 2}
 
 
 class Calibration:
@@ -41,7 +40,7 @@ class Calibration:
         self._due_us = now_us + _STEP_US
         step, self._step = self._step, self._step + 1
         if step == 0:
-            return [f"[cal] calibration started: {_KINDS[self._kind]} {self._kind}"]
+            return [f"[cal] calibration started: 2 {self._kind}"]
         if step <= _STEPS:
             return [f"[cal] progress <{100 * step // _STEPS}>"]
         kind, self._kind, self._step = self._kind, "", 0

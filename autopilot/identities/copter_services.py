@@ -21,20 +21,7 @@ _LOW_US, _HIGH_US, _CHANNEL_US = 1200, 1800, (800, 2200)
 _RAISED_US = 1600
 _THROTTLE, _YAW, _DOWN_US, _RIGHT_US, _LEFT_US, _HELD_US = 2, 3, 1050, 1900, 1100, 2_000_000
 _ARMS, _DISARMS = 1, 2
-_MODE_OPTIONS = {
-    4: 6,
-    16: 3,
-    18: 9,
-    33: 17,
-    52: 1,
-    55: 4,
-    56: 5,
-    57: 23,
-    68: 0,
-    69: 16,
-    70: 2,
-    72: 7,
-}
+_MODE_OPTIONS = {4: 6, 16: 3, 18: 9, 33: 17, 52: 1, 55: 4, 56: 5, 57: 23, 68: 0, 69: 16, 70: 2, 72: 7}
 """Mode number by RCn_OPTION."""
 _FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
 _M_PER_DEG = 111_319.5
@@ -148,18 +135,25 @@ class StreamRates:
         return ()
 
 
-class PreArm:
-    """Says twice a minute why the vehicle cannot arm."""
+class Polled:
+    """A service that receives no messages."""
 
     handles = frozenset[str]()
 
     def __init__(self, served: Served) -> None:
         self._served = served
-        self._due_us = _PREARM_EVERY_US
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         del message, peer, now_us
         return ()
+
+
+class PreArm(Polled):
+    """Says twice a minute why the vehicle cannot arm."""
+
+    def __init__(self, served: Served) -> None:
+        super().__init__(served)
+        self._due_us = _PREARM_EVERY_US
 
     def poll(self, now_us: int) -> Iterable[Send]:
         snapshot = self._served.snapshot
@@ -171,21 +165,15 @@ class PreArm:
         return ()
 
 
-class Switches:
+class Switches(Polled):
     """Modes by the mode switch and by switches with a function, and arming by the yaw stick."""
 
-    handles = frozenset[str]()
-
     def __init__(self, served: Served) -> None:
-        self._served = served
+        super().__init__(served)
         self._channels: tuple[int, ...] = ()
         self._position: int | None = None
         self._high: dict[int, bool] = {}
         self._stick, self._since_us = 0, 0
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, peer, now_us
-        return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
         snapshot = self._served.snapshot
@@ -255,19 +243,13 @@ class Switches:
                 self._served.pilot.disarm(force=manual)
 
 
-class SimulatedWorld:
+class SimulatedWorld(Polled):
     """Changes of the simulated world by SIM_*."""
 
-    handles = frozenset[str]()
-
     def __init__(self, served: Served) -> None:
-        self._served = served
+        super().__init__(served)
         self._revision = served.parameters.revision
         self._flown = dict(_WORLD_AT_REST)
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, peer, now_us
-        return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
         del now_us

@@ -17,7 +17,7 @@ _DEG = radians(1.0)
 _YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
 
 
-class BehaviourRow(NamedTuple):
+class Tunable(NamedTuple):
     """A parameter for a `field`, which is `scale` times the parameter."""
 
     name: str
@@ -50,96 +50,68 @@ class BehaviourRow(NamedTuple):
 
 
 ROWS = (
-    BehaviourRow("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Take-off height", "Above the ground."),
-    BehaviourRow("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "In automatic modes."),
-    BehaviourRow(
-        "MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Maximum horizontal speed", "Limit of all commands."
-    ),
-    BehaviourRow("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Climb speed"),
-    BehaviourRow("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Descent speed"),
-    BehaviourRow("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
-    BehaviourRow("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down."),
-    BehaviourRow("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Lower is smoother."),
-    BehaviourRow("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Yaw rate", "", _DEG, 1),
-    BehaviourRow(
-        "MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Yaw acceleration", "", _DEG, 1
-    ),
-    BehaviourRow("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Take-off speed"),
-    BehaviourRow("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Landing speed", "Near the ground."),
-    BehaviourRow(
-        "MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt at full stick", "Mode stabilized.", 1.0, 1
-    ),
-    BehaviourRow("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Yaw rate at full stick", "", _DEG, 1),
-    BehaviourRow(
-        "MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed at full stick", "Mode position."
-    ),
-    BehaviourRow("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Return height", "Above home."),
-    BehaviourRow(
-        "RTL_MIN_DIST",
-        "return_radius_m",
-        "m",
-        0.0,
-        1000.0,
-        "Return radius without climb",
+    Tunable("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Take-off height", "Above the ground."),
+    Tunable("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "In automatic modes."),
+    Tunable("MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Maximum horizontal speed", "Limit of all commands."),
+    Tunable("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Climb speed"),
+    Tunable("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Descent speed"),
+    Tunable("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
+    Tunable("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down."),
+    Tunable("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Lower is smoother."),
+    Tunable("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Yaw rate", "", _DEG, 1),
+    Tunable("MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Yaw acceleration", "", _DEG, 1),
+    Tunable("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Take-off speed"),
+    Tunable("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Landing speed", "Near the ground."),
+    Tunable("MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt at full stick", "Mode stabilized.", 1.0, 1),
+    Tunable("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Yaw rate at full stick", "", _DEG, 1),
+    Tunable("MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed at full stick", "Mode position."),
+    Tunable("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Return height", "Above home."),
+    Tunable(
+        *("RTL_MIN_DIST", "return_radius_m", "m", 0.0, 1000.0, "Return radius without climb"),
         "Closer to home, the return skips its climb.",
     ),
-    BehaviourRow(
-        "NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Distance that counts as arrival."
-    ),
-    BehaviourRow("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm delay after landing", "0: off."),
-    BehaviourRow(
-        "COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm delay without take-off", "0: off."
-    ),
-    BehaviourRow(
-        "COM_OF_LOSS_T",
-        "setpoints_lost_s",
-        "s",
-        0.1,
-        60.0,
-        "Offboard loss timeout",
+    Tunable("NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Distance that counts as arrival."),
+    Tunable("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm delay after landing", "0: off."),
+    Tunable("COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm delay without take-off", "0: off."),
+    Tunable(
+        *("COM_OF_LOSS_T", "setpoints_lost_s", "s", 0.1, 60.0, "Offboard loss timeout"),
         "Longest silence of a companion; its last body rates are followed for 0.3 s.",
     ),
-    BehaviourRow(
-        "COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Stick loss timeout", "Longest silence of the sticks."
-    ),
-    BehaviourRow(
-        "GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: off."
-    ),
-    BehaviourRow("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: off."),
-    BehaviourRow(
-        "ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Orbit radius", "Default, if the command has NaN."
-    ),
-    BehaviourRow("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
-    BehaviourRow("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
-    BehaviourRow(
+    Tunable("COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Stick loss timeout", "Longest silence of the sticks."),
+    Tunable("GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: off."),
+    Tunable("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: off."),
+    Tunable("ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Orbit radius", "Default, if the command has NaN."),
+    Tunable("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
+    Tunable("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
+    Tunable(
         *("FLW_TGT_FA", "follow_angle_deg", "deg", -180.0, 180.0, "Follow: bearing from the target"),
         *("Clockwise; 0 is ahead, 180 behind.", 1.0, 1),
     ),
-    BehaviourRow(
+    Tunable(
         *("FLW_TGT_ALT_M", "follow_altitude_mode", "", 0, 2, "Follow: height reference"),
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
-    BehaviourRow(
+    Tunable(
         *("CA_FAILURE_MODE", "rotor_failure", "", 0, 2, "Rotor failure"),
         *("Detection; 0 also clears a detected failure.",),
         values=((0, "Ignore"), (1, "Land on three of four, fly on without one of more"), (2, "Land")),
     ),
-    BehaviourRow(
+    Tunable(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
         *("Accept MAV_CMD_INJECT_FAILURE.",),
         values=_YES_OR_NO,
     ),
-    BehaviourRow(
+    Tunable(
         *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
         "Simulated delay of commands; samples in between are skipped.",
         *(1e-3, 1),
     ),
-    BehaviourRow(
+    Tunable(
         *("SYS_CMD_DELAY", "delay_s", "ms", -1.0, 200.0, "Compensated delay"),
         "From a frame to the effect of its command. -1: profile or measured.",
         *(1e-3, 1),
     ),
-    BehaviourRow(
+    Tunable(
         *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Track of mode track."),
         values=tuple(enumerate(TRACKS)),
     ),
@@ -226,19 +198,12 @@ def _group(name: str) -> str:
     return _GROUPS[name.partition("_")[0]]
 
 
-_GROUPS = {
-    "MIS": "Flight",
-    "MPC": "Flight",
-    "RTL": "Return",
-    "NAV": "Flight",
-    "COM": "Safety",
-    "CA": "Safety",
-    "ORBIT": "Flight",
-    "FLW": "Follow",
-    "SYS": "System",
-    "SIM": "System",
-    "TRACK": "Flight",
-    "CAL": "System",
-    "GF": "Failsafes",
-    "MAV": "System",
+_PREFIXES = {
+    "Flight": "MIS MPC NAV ORBIT TRACK",
+    "Follow": "FLW",
+    "Return": "RTL",
+    "Safety": "COM CA",
+    "Failsafes": "GF",
+    "System": "SYS SIM CAL MAV",
 }
+_GROUPS = {prefix: group for group, prefixes in _PREFIXES.items() for prefix in prefixes.split()}

@@ -39,24 +39,10 @@ def _poles(name: str, key: Path, what: str) -> list[Number]:
 
 
 def _references(prefix: str) -> list[Number]:
+    speed, tilt = ("guidance", "approach_speed_m_s"), ("guidance", "max_tilt_deg")
     return [
-        Number(
-            f"{prefix}_APPROACH",
-            ("guidance", "approach_speed_m_s"),
-            "m/s",
-            0.1,
-            30.0,
-            "Approach speed to a far reference",
-        ),
-        Number(
-            f"{prefix}_TILT_MAX",
-            ("guidance", "max_tilt_deg"),
-            "deg",
-            5.0,
-            180.0,
-            "Maximum tilt; from 90 on: none",
-            decimals=1,
-        ),
+        Number(f"{prefix}_APPROACH", speed, "m/s", 0.1, 30.0, "Approach speed to a far reference"),
+        Number(f"{prefix}_TILT_MAX", tilt, "deg", 5.0, 180.0, "Maximum tilt; from 90 on: none", decimals=1),
     ]
 
 
