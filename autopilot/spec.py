@@ -72,8 +72,7 @@ class LawSpec:
         float | None, Option("height below which no track may lead, m (default: the ground, 0)", "M", "m", endless=True)
     ] = None
     feedback: Annotated[
-        Feedback,
-        Option("input of the autopilot: the true state (default) or simulated sensors", "state|sensors"),
+        Feedback, Option("input of the autopilot: the true state (default) or simulated sensors", "state|sensors")
     ] = Feedback.STATE
 
     @property
@@ -123,8 +122,7 @@ class GroundSpec:
         ),
     ] = ()
     signing_key: Annotated[
-        Path | None,
-        Option("sign messages, and refuse messages without a signature of this key", "FILE", keyword=False),
+        Path | None, Option("sign messages, and refuse messages without a signature of this key", "FILE", keyword=False)
     ] = None
     insecure: Annotated[bool, Option("let links leave this computer without a key", keyword=False)] = False
 
@@ -134,10 +132,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     plant: Annotated[str, Option("the plant to call", "URL")] = DEFAULT_PLANT
     simulator: Annotated[
         str | None,
-        Option(
-            "fly a simulator with PX4's interface on its sensors, for example jMAVSim: tcp:127.0.0.1:4560",
-            "URL",
-        ),
+        Option("fly a simulator with PX4's interface on its sensors, for example jMAVSim: tcp:127.0.0.1:4560", "URL"),
     ] = None
     track: Annotated[
         str | Trajectory | None,

@@ -53,8 +53,6 @@ _ACCEPTED = (
 
 
 class CopterCommands(Commands):
-    """Handlers of the commands of ArduPilot's ground stations."""
-
     motion: CopterMotion
 
     def __init__(
@@ -210,7 +208,6 @@ class CopterCommands(Commands):
         return None
 
     def _jump_to_tag(self, command: ReceivedCommand) -> Refusal | None:
-        """Refuse every tag: missions have none."""
         valid = 0.0 <= command.p1 <= _MAX_TAG
         return Refusal(f"mission: there is no tag {command.p1:g}", FAILED if valid else DENIED)
 

@@ -34,8 +34,6 @@ _LIFTING_US = 500_000
 
 
 class CopterMotion(MotionCommands):
-    """Handlers of the commands to move, and of setpoints."""
-
     def __init__(
         self,
         pilot: Pilot,
@@ -84,7 +82,8 @@ class CopterMotion(MotionCommands):
         if not pilot.ground.height_m + MIN_CLIMB_M <= up_m < MAX_HEIGHT_M:
             return Refusal(f"Takeoff: {command.z:g} m above home is not above the vehicle", FAILED)
         context = pilot.context()
-        return _failed(self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, context.behaviour.limits.climb_m_s)))
+        refusal = self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, context.behaviour.limits.climb_m_s))
+        return refusal and refusal._replace(result=FAILED)
 
     def takeoff_by_stick(self, height_m: float) -> None:
         """Climb to a height above the ground, once the throttle is raised in a mode that holds height."""
@@ -92,11 +91,8 @@ class CopterMotion(MotionCommands):
         lifts = pilot.sensed.now_us - pilot.ground.times.takeoff_us < _LIFTING_US and pilot.state.mode in MANUAL
         if (pilot.ground.standing or lifts) and self._modes.shown.number in (LOITER, POSHOLD, ALT_HOLD):
             context = pilot.context()
-            speed_m_s = context.behaviour.stick_climb_m_s or None
-            self._fly(
-                Mode.TAKEOFF,
-                TakeoffTask(pilot.ground.height_m + height_m + _ARRIVES_WITHIN_M, None, context, speed_m_s),
-            )
+            up_m = pilot.ground.height_m + height_m + _ARRIVES_WITHIN_M
+            self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, context.behaviour.stick_climb_m_s or None))
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         if not self.guided:
@@ -151,7 +147,3 @@ class CopterMotion(MotionCommands):
         facing = int(mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER)
         order = Orbit(center, radius_m if speed_m_s >= 0.0 else -radius_m, abs(speed_m_s) or None, facing)
         return self._fly(Mode.ORBIT, OrbitTask(order, context))
-
-
-def _failed(refusal: Refusal | None) -> Refusal | None:
-    return refusal and refusal._replace(result=FAILED)

@@ -23,8 +23,6 @@ _ITEM_US, _PAIR_US = 4.0, 0.02
 
 
 class Fence:
-    """The fences of one vehicle."""
-
     def __init__(self, home: Home, behaviour: Behaviour, budget: Budget) -> None:
         self._home, self.budget = home, budget
         self._behaviour = behaviour
@@ -72,7 +70,6 @@ class Fence:
         return self._behaviour.floor_m if self.above_floor else -inf
 
     def watch_floor(self, height_m: float, *, lands: bool) -> None:
-        """Take in the height above home."""
         self.above_floor = not lands and (self.above_floor or height_m > self._behaviour.floor_m)
 
     def refusal(self, place: Vector) -> Refusal | None:

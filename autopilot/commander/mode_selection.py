@@ -88,7 +88,6 @@ class ModeSelection:
         return self.select(self.book.chosen[mode])
 
     def fly(self, mode: Mode) -> Refusal | None:
-        """Fly a mode of the vehicle, whatever clients see of it."""
         refusal = self._pilot.select(mode, self._needs.missing())
         remark = "" if refusal else self._needs.remark(mode)
         if remark:

@@ -71,8 +71,6 @@ def task_record(task: FlightTask) -> TaskRecord:
 
 
 class ModeTasks:
-    """Factory of one vehicle's flight tasks."""
-
     def __init__(
         self,
         missions: Missions,

@@ -34,8 +34,6 @@ NOT_FLYING = "the vehicle is not flying"
 
 
 class MotionCommands:
-    """Handlers of the commands to move."""
-
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         self._pilot = pilot
         self._fence = fence

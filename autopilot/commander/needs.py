@@ -30,8 +30,6 @@ class LatestSticks(Latest[Sticks], Protocol):
 
 
 class ModeNeeds:
-    """Needs of modes for one pilot."""
-
     def __init__(
         self,
         pilot: Pilot,
@@ -76,7 +74,6 @@ class ModeNeeds:
         return unmet | self._missions.unmet
 
     def refusals(self) -> list[str]:
-        """Return the reasons against arming."""
         return self._pilot.readiness.refusals()
 
     def remark(self, mode: Mode) -> str:

@@ -17,8 +17,6 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
 
 
 class Supervisor:
-    """Supervisor of one vehicle."""
-
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
         self._lines = lines
         self._conditions = Conditions()

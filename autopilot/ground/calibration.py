@@ -8,8 +8,6 @@ _STEPS = 10
 
 
 class Calibration:
-    """Runs one calibration at a time."""
-
     def __init__(self) -> None:
         self._kind = ""
         self._step = 0

@@ -26,8 +26,6 @@ from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 
 
 class Commanded(NamedTuple):
-    """The parts that commands act on."""
-
     pilot: Pilot
     fence: Fence
     missions: Missions

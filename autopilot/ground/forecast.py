@@ -18,8 +18,6 @@ POINTS = 5
 
 
 class Forecaster:
-    """Integrates the plans of one control law."""
-
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
         self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)

@@ -44,8 +44,6 @@ _SINKING_M_S = -0.1
 
 
 class SnapshotBuilder:
-    """Builds the snapshots of one vehicle."""
-
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
         self._interval_s = interval_s
         self._columns = columns

@@ -99,8 +99,6 @@ class Guarding(Protocol):
 
 
 class Stations:
-    """Serves any number of ground stations."""
-
     def __init__(
         self,
         settings: StationSettings,

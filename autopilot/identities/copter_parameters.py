@@ -37,8 +37,6 @@ voltage.
 
 
 class CopterRow(NamedTuple):
-    """A line of the file."""
-
     name: str
     kind: str
     default: Value
@@ -108,8 +106,6 @@ def booted(values: dict[str, Value]) -> dict[str, Value]:
 
 
 class ParameterLinks:
-    """Changes that follow from others."""
-
     def __init__(self, definitions: Mapping[str, Parameter]) -> None:
         self.definitions = definitions
         linked = [row for row in rows() if row.ours]

@@ -78,8 +78,6 @@ def _text(text: str, channel: int) -> Send:
 
 
 class VersionRequests:
-    """Answers AUTOPILOT_VERSION_REQUEST."""
-
     handles = frozenset({"AUTOPILOT_VERSION_REQUEST"})
 
     def __init__(self, served: Served) -> None:

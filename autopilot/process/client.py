@@ -35,8 +35,6 @@ def _refusal(result: int) -> str:
 
 
 class PlantClient:
-    """Drives the autopilot's end of a link."""
-
     def __init__(
         self,
         link: UdpLink | BlockingReceiver,

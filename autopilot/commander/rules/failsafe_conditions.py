@@ -61,8 +61,6 @@ class FailsafeInputs(NamedTuple):
 
 
 class Conditions:
-    """Tracks the conditions of one vehicle."""
-
     def __init__(self) -> None:
         self._since_us: dict[Condition, int] = {}
         self._position: Vector | None = None

@@ -23,8 +23,6 @@ _RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.L
 
 
 class FailsafeSetting(NamedTuple):
-    """Delay and action of a failsafe."""
-
     delay_us: int
     action: Action
 

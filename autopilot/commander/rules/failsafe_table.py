@@ -261,12 +261,7 @@ TABLE: tuple[FailsafeRow, ...] = (
         "COM_BAR_LOSS_ACT",
         Action.WARN,
     ),
-    _sensor(
-        Condition.MAGNETOMETER_LOST,
-        "field rejected; heading from the gyroscope",
-        "COM_MAG_LOSS_ACT",
-        Action.WARN,
-    ),
+    _sensor(Condition.MAGNETOMETER_LOST, "field rejected; heading from the gyroscope", "COM_MAG_LOSS_ACT", Action.WARN),
     FailsafeRow(
         Condition.GPS_LOST,
         "sensors: fixes missing or rejected",

@@ -85,7 +85,6 @@ class ModeBook:
         return {mode.number: mode for mode in self.modes}
 
     def listed(self) -> Iterable[ShownMode]:
-        """Return the modes that the vehicle flies."""
         return (mode for mode in self.modes if mode.flies is not None)
 
 
