@@ -1,7 +1,7 @@
 """A log of each flight for ground stations, as ULog or DataFlash."""
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from colibri.mavlink.dataflash.recorder import DataFlashRecorder
 from colibri.mavlink.files.flight_log import ULOG_NAMES, FlightLog, LogNames
@@ -14,18 +14,7 @@ from colibri.mavlink.ulog.recorder import Recorder
 
 LOGS = "logs"
 Write = Callable[[bytes], None]
-
-
-class FlightRecorder(Protocol):
-    """Encodes a flight as a log of one format."""
-
-    def begin(self) -> bytes: ...
-
-    def update(self, snapshot: TelemetrySnapshot) -> None: ...
-
-    def say(self, time_us: int, severity: int, text: str) -> None: ...
-
-    def flush(self) -> None: ...
+FlightRecorder = Recorder | DataFlashRecorder
 
 
 class LoggedVehicle(NamedTuple):

@@ -305,12 +305,8 @@ class GroundService:
 
 def _invitation(url: str) -> str:
     scheme, _, rest = url.partition(":")
-    calls = scheme in ("udpout", "tcp", "serial")
-    return (
-        f"connects to ground stations at {rest} ({scheme})"
-        if calls
-        else f"waits for ground stations on {rest} ({scheme})"
-    )
+    does = "connects to ground stations at" if scheme in ("udpout", "tcp", "serial") else "waits for ground stations on"
+    return f"{does} {rest} ({scheme})"
 
 
 def _noting(received: Iterable[Received], datagrams: list[bytes]) -> Iterator[Received]:
