@@ -12,7 +12,7 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """Numbers of the vehicle's behaviour, described in `parameters/behaviour.py`; 0 switches a limit or disarming off.
+    """Numbers of the vehicle's behaviour, described in `parameters/behaviour.csv`; 0 switches a limit or disarming off.
 
     An identity sets those from `return_delay_s` on: a return waits above home for `return_delay_s`, ends
     `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`.

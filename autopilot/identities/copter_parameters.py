@@ -1,23 +1,19 @@
 """ArduCopter's parameters, beside Colibri's own: a change under one name shows under the other.
 
-`arducopter.csv` has name, type (b, h, i for integers of 8, 16 and 32 bits, f for a float), default, range and unit, and
-for a parameter with one counterpart its name and scale. The parameters of fence and failsafes have several.
+In `arducopter.csv`, the path is the name of the counterpart, where there is one. The parameters of fence and failsafes
+have several.
 Source: ArduCopter 4.6, Parameters.cpp and its libraries, with the defaults of its SITL.
 """
 
-import csv
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
+from colibri.mavlink.parameters.numbers import Number, read_numbers
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, Value, float32
 from colibri.mavlink.wire.dialect import mav
 
-_FILE = Path(__file__).with_name("arducopter.csv")
-_REAL = "f"
 _WIRE = {"b": mav.MAV_PARAM_TYPE_INT8, "h": mav.MAV_PARAM_TYPE_INT16, "i": mav.MAV_PARAM_TYPE_INT32}
-_BITS = {"b": 8, "h": 16, "i": 32}
 _ALT_MAX, _CIRCLE = 1, 2
 _WARN, _HOLD, _RETURN, _LAND = 1, 2, 3, 5
 _FENCE_ACTIONS = {0: _WARN, 1: _RETURN, 2: _LAND, 3: _RETURN, 4: _HOLD, 5: _RETURN}
@@ -36,62 +32,17 @@ voltage.
 """
 
 
-class CopterRow(NamedTuple):
-    name: str
-    kind: str
-    default: Value
-    minimum: Value
-    maximum: Value
-    unit: str
-    ours: str
-    scale: float
-    description: str
-
-    def parameter(self, default: Value) -> Parameter:
-        real = self.kind == _REAL
-        return Parameter(
-            name=self.name,
-            kind=ParamType.REAL if real else ParamType.INT,
-            default=float(default) if real else int(default),
-            minimum=self.minimum,
-            maximum=self.maximum,
-            unit=self.unit,
-            description=self.description,
-            group="ArduCopter",
-            wire=0 if real else _WIRE[self.kind],
-        )
-
-
 @cache
-def rows() -> tuple[CopterRow, ...]:
-    with _FILE.open(encoding="ascii", newline="") as file:
-        return tuple(_row(**line) for line in csv.DictReader(file))
-
-
-def _row(**cells: str) -> CopterRow:
-    kind = cells["type"]
-    if kind == _REAL:
-        read, widest = float, 3.0e38
-    else:
-        read, widest = int, 2 ** (_BITS[kind] - 1) - 1  # type: ignore[assignment]
-    minimum, maximum = cells["minimum"], cells["maximum"]
-    return CopterRow(
-        cells["name"],
-        kind,
-        read(cells["default"]),
-        read(minimum) if minimum else -widest,
-        read(maximum) if maximum else widest,
-        cells["unit"],
-        cells["ours"],
-        float(cells["scale"] or 1.0),
-        cells["description"],
-    )
+def rows() -> tuple[Number, ...]:
+    return read_numbers(Path(__file__).with_name("arducopter.csv"))
 
 
 def copter_parameters(ours: Iterable[Parameter], system_id: int) -> Parameters:
     """Return Colibri's parameters and ArduCopter's, with ArduCopter's defaults under both names."""
     own = {"SYSID_THISMAV": system_id}
-    theirs = [row.parameter(own.get(row.name, row.default)) for row in rows()]
+    theirs = [
+        row.parameter(own.get(row.name, row.default), "ArduCopter", wire=_WIRE.get(row.kind, 0)) for row in rows()
+    ]
     defaults = {each.name: each.default for each in theirs}
     links = ParameterLinks({each.name: each for each in (*ours, *theirs)})
     return Parameters(
@@ -108,9 +59,9 @@ def booted(values: dict[str, Value]) -> dict[str, Value]:
 class ParameterLinks:
     def __init__(self, definitions: Mapping[str, Parameter]) -> None:
         self.definitions = definitions
-        linked = [row for row in rows() if row.ours]
-        self._ours = {row.name: (row.ours, row.scale) for row in linked}
-        self._theirs = {row.ours: (row.name, 1.0 / row.scale) for row in linked}
+        linked = [(row.name, str(row.path[0]), row.scale) for row in rows() if row.path]
+        self._ours = {name: (ours, scale) for name, ours, scale in linked}
+        self._theirs = {ours: (name, 1.0 / scale) for name, ours, scale in linked}
 
     def __call__(self, changes: Mapping[str, Value], values: Mapping[str, Value]) -> dict[str, Value]:
         """Return further changes, given all values with the first ones."""

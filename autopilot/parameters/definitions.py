@@ -1,6 +1,7 @@
 """All parameters of the autopilot: control law, vehicle model, behaviour, failsafes."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -10,17 +11,62 @@ from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.behaviour import behaviour, behaviour_parameters
-from colibri.autopilot.parameters.control_law import law_numbers
-from colibri.autopilot.parameters.number_paths import changed, described
-from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
+from colibri.autopilot.parameters.number_paths import changed, described, has, named, read
+from colibri.mavlink.parameters.numbers import Number, read_numbers
 from colibri.mavlink.parameters.store import Parameter, Value
-from colibri.plant.vehicle.description import Vehicle
+from colibri.plant.vehicle.description import MAX_ROTORS, Vehicle
 
 __all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
+
+_FOLDER = Path(__file__).parent
+DESCRIBED = {"lpv-mpc": read_numbers(_FOLDER / "lpv_mpc.csv")}
+"""Numbers by name of the control law; those of `lpv-mpc` are without its samples, preview and solver."""
+STRUCTURE = frozenset({"control_interval_s", "qp"})
+"""Keys of any control law fixed in flight."""
+_PREFIX_LENGTH = 3
+_SPEED = "{speed}"
+"""Placeholder for the unit of rotor speeds."""
 
 
 class ImpossibleError(AutopilotError):
     """Values that contradict each other; the message names the key."""
+
+
+def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
+    """Return a law's numbers; undescribed ones are named by their keys."""
+    if controller in DESCRIBED:
+        return [number for number in DESCRIBED[controller] if has(table, number.path)]
+    letters = "".join(letter for letter in controller.upper() if letter.isascii() and letter.isalnum())
+    start = letters.lstrip("0123456789") or "LAW"
+    return named(start[:_PREFIX_LENGTH], table, STRUCTURE)
+
+
+def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
+    """Return the numbers of a vehicle that it models, in its unit of rotor speeds."""
+    speed = tree["rotors"]["speed_unit"]
+    inside = f"({speed})" if "/" in speed else speed
+    return [
+        number._replace(unit=speed if number.unit == _SPEED else number.unit.replace(_SPEED, inside))
+        for number in _VEHICLE
+        if has(tree, number.path)
+    ]
+
+
+def _each_rotor(line: Number) -> list[Number]:
+    """Return a line for each rotor, where its path has `{n}`."""
+    if "{n}" not in line.path:
+        return [line]
+    return [
+        line._replace(
+            name=line.name.format(n=rotor + 1),
+            path=tuple(rotor if key == "{n}" else key for key in line.path),
+            description=line.description.format(n=rotor + 1),
+        )
+        for rotor in range(MAX_ROTORS)
+    ]
+
+
+_VEHICLE = [number for line in read_numbers(_FOLDER / "vehicle.csv") for number in _each_rotor(line)]
 
 
 class Numbers:
@@ -33,11 +79,12 @@ class Numbers:
         self._model = vehicle_numbers(self._tree)
         name, keys = profile.controller, f"controllers.{profile.controller}"
         self.definitions = [
-            number.parameter(self._table, f"Control law {name}", f"Profile key {keys}.{described(number.path)}.")
-            for number in self._law
-        ] + [
-            number.parameter(self._tree, "Vehicle model", f"Vehicle key {described(number.path)}, autopilot only.")
-            for number in self._model
+            number.parameter(_default(number, tree), group, details.format(described(number.path)))
+            for numbers, tree, group, details in (
+                (self._law, self._table, f"Control law {name}", f"Profile key {keys}.{{}}."),
+                (self._model, self._tree, "Vehicle model", "Vehicle key {}, autopilot only."),
+            )
+            for number in numbers
         ]
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
@@ -61,3 +108,8 @@ def _vehicle(tree: dict[str, Any]) -> Vehicle:
         return msgspec.convert(tree, type=Vehicle)
     except (msgspec.ValidationError, ArithmeticError) as reason:
         raise ImpossibleError(str(reason)) from reason
+
+
+def _default(number: Number, tree: Mapping[str, Any]) -> Value:
+    value: Value = read(tree, number.path)
+    return value if isinstance(value, int) else value / number.scale

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
 from math import isfinite
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
-from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Parameter, ParamType, Value
+from colibri.mavlink.parameters.numbers import Number, NumberPath
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Value
 
-Path: TypeAlias = tuple[str | int, ...]
-"""Keys and list indices, outermost first."""
 Tree: TypeAlias = dict[str, Any]
 
 _UNITS = {
@@ -29,36 +28,7 @@ _MAX_NAME_CHARS = 16
 _MAX_WORD_CHARS = 8
 
 
-class Number(NamedTuple):
-    name: str
-    path: Path
-    unit: str = ""
-    minimum: float = -FLOAT32_MAX
-    maximum: float = FLOAT32_MAX
-    description: str = ""
-    scale: float = 1.0
-    decimals: int = 3
-
-    def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
-        """Return the parameter; its bounds widen to include the default."""
-        value = read(tree, self.path)
-        kind = ParamType.INT if isinstance(value, int) else ParamType.REAL
-        default = value if kind == ParamType.INT else value / self.scale
-        return Parameter(
-            name=self.name,
-            kind=kind,
-            default=default,
-            minimum=min(self.minimum, default),
-            maximum=max(self.maximum, default),
-            unit=self.unit,
-            decimals=self.decimals,
-            description=self.description,
-            details=details,
-            group=group,
-        )
-
-
-def read(tree: Mapping[str, Any], path: Path) -> Any:
+def read(tree: Mapping[str, Any], path: NumberPath) -> Any:
     """Return the value at `path`, or raise KeyError."""
     here: Any = tree
     for key in path:
@@ -69,7 +39,7 @@ def read(tree: Mapping[str, Any], path: Path) -> Any:
     return here
 
 
-def has(tree: Mapping[str, Any], path: Path) -> bool:
+def has(tree: Mapping[str, Any], path: NumberPath) -> bool:
     try:
         return is_number(read(tree, path))
     except KeyError:
@@ -85,7 +55,7 @@ def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], 
     return tree
 
 
-def _with(tree: Any, path: Path, value: Value) -> Any:
+def _with(tree: Any, path: NumberPath, value: Value) -> Any:
     if not path:
         return value
     key, *rest = path
@@ -104,7 +74,7 @@ def is_number(value: Any) -> bool:
     return isinstance(value, float) and isfinite(value) and abs(value) <= FLOAT32_MAX
 
 
-def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
+def paths(tree: Any, before: NumberPath = ()) -> Iterator[NumberPath]:
     if is_number(tree):
         yield before
     elif isinstance(tree, Mapping):
@@ -129,13 +99,13 @@ def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> lis
     return numbers
 
 
-def described(path: Path) -> str:
+def described(path: NumberPath) -> str:
     """Return a path as text: a.b[1]."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return text.removeprefix(".")
 
 
-def _without_unit(path: Path) -> tuple[Path, str]:
+def _without_unit(path: NumberPath) -> tuple[NumberPath, str]:
     place = max(place for place, key in enumerate(path) if isinstance(key, str))
     key = str(path[place])
     for ending, unit in _UNITS.items():
@@ -144,7 +114,7 @@ def _without_unit(path: Path) -> tuple[Path, str]:
     return path, ""
 
 
-def _names(prefix: str, path: Path) -> Iterator[str]:
+def _names(prefix: str, path: NumberPath) -> Iterator[str]:
     words = [_plain(word) for key in path if isinstance(key, str) for word in key.split("_")]
     places = "".join(str(key + 1) for key in path if isinstance(key, int))
     room = _MAX_NAME_CHARS - len(prefix) - 1 - len(places)

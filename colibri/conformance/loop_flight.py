@@ -12,7 +12,7 @@ from colibri.autopilot.control.interface import AttitudeDemand, Controller, Vehi
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.registry import BuildError, in_words
 from colibri.autopilot.guidance.trajectories.planner import Planner
-from colibri.autopilot.parameters.number_paths import Number, changed, described, paths, read
+from colibri.autopilot.parameters.number_paths import changed, described, paths, read
 from colibri.common.errors import Error
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
@@ -21,6 +21,7 @@ from colibri.conformance.step_records import FlownStep, fly_for_steps
 from colibri.conformance.subject import Row, Subject, judged, not_applicable
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.parameters.numbers import Number
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 
 

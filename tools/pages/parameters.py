@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.parameters.control_law import DESCRIBED
-from colibri.autopilot.parameters.definitions import definitions
+from colibri.autopilot.parameters.definitions import DESCRIBED, definitions
 from colibri.mavlink.parameters.store import FLOAT32_MAX, Parameter, ParamType
 from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_body

@@ -13,10 +13,16 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.parameters.behaviour import BY_IDENTITY, ROWS, TRACKS
-from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
-from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
+from colibri.autopilot.parameters.definitions import (
+    DESCRIBED,
+    STRUCTURE,
+    Numbers,
+    behaviour,
+    definitions,
+    law_numbers,
+    vehicle_numbers,
+)
 from colibri.autopilot.parameters.number_paths import described, paths, read
-from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import ParamError, Parameters, ParamType
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
@@ -57,7 +63,7 @@ def test_every_changeable_profile_number_is_a_parameter(controller: str) -> None
     table = FLIGHT.table(controller)
     there = {described(path) for path in paths(table)}
     numbers = law_numbers(controller, table)
-    assert numbers == DESCRIBED[controller]
+    assert numbers == list(DESCRIBED[controller])
     assert there - {described(number.path) for number in numbers} == NOT_IN_FLIGHT[controller]
 
 
@@ -124,7 +130,7 @@ def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
 @pytest.mark.parametrize("kind", [Behaviour, Limits])
 def test_every_number_of_the_behaviour_is_a_parameter(kind: Any) -> None:
     names = set(Limits._fields) if kind is Limits else {field.name for field in fields(Behaviour)} - {"limits"}
-    assert names <= {row.field for row in ROWS} | set(BY_IDENTITY)
+    assert names <= {row.path[-1] for row in ROWS} | set(BY_IDENTITY)
 
 
 def test_behaviour_is_what_the_parameters_say() -> None:
@@ -151,7 +157,7 @@ def test_each_parameter_of_the_behaviour_changes_its_own_field() -> None:
             changed = {
                 field.name for field in fields(Behaviour) if getattr(now, field.name) != getattr(usual, field.name)
             }
-            expected = "limits" if row.field in Limits._fields else row.field
+            expected = row.path[0]
             assert changed == (set() if parameters[row.name] == parameters.default(row.name) else {expected})
 
 

@@ -7,8 +7,7 @@ import pytest
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.subscription import FlownSettings, Subscribers
-from colibri.autopilot.parameters.control_law import DESCRIBED
-from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, definitions
+from colibri.autopilot.parameters.definitions import DESCRIBED, ImpossibleError, Numbers, definitions
 from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.common.config import SettingsError
 from colibri.mavlink.parameters.store import ParamError, Parameters, Value

@@ -1,0 +1,83 @@
+"""Numbers that parameters set; tables of them are CSV files with a line for each parameter."""
+
+import csv
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+from colibri.mavlink.parameters.store import FLOAT32_MAX, Parameter, ParamType, Value
+
+NumberPath: TypeAlias = tuple[str | int, ...]
+"""Keys and list indices, outermost first; in a file `a.b.1`."""
+
+
+class Number(NamedTuple):
+    """A parameter for the number at `path`, which is `scale` times its value.
+
+    Attributes:
+        kind: Type on the wire: b, h or i for integers of 8, 16 or 32 bits, f for a float; empty: by the default.
+        values: Valid values with meanings, if not all are valid; in a file `0=Off|1=On`.
+    """
+
+    name: str
+    path: NumberPath = ()
+    unit: str = ""
+    minimum: Value = -FLOAT32_MAX
+    maximum: Value = FLOAT32_MAX
+    description: str = ""
+    scale: float = 1.0
+    decimals: int = 3
+    default: Value = 0
+    kind: str = ""
+    group: str = ""
+    details: str = ""
+    values: tuple[tuple[int, str], ...] = ()
+    read_only: bool = False
+
+    def parameter(self, default: Value, group: str = "", details: str = "", wire: int = 0) -> Parameter:
+        """Return the parameter; its bounds widen to include the default."""
+        return Parameter(
+            name=self.name,
+            kind=ParamType.REAL if isinstance(default, float) else ParamType.INT,
+            default=default,
+            minimum=min(self.minimum, default),
+            maximum=max(self.maximum, default),
+            unit=self.unit,
+            decimals=self.decimals,
+            description=self.description,
+            details=details or self.details,
+            group=group or self.group,
+            values=self.values,
+            read_only=self.read_only,
+            wire=wire,
+        )
+
+
+def _number(text: str) -> Value:
+    return int(text) if text.removeprefix("-").isdecimal() else float(text)
+
+
+def _path(text: str) -> NumberPath:
+    return tuple(int(key) if key.isdecimal() else key for key in text.split("."))
+
+
+def _values(text: str) -> tuple[tuple[int, str], ...]:
+    pairs = (pair.split("=") for pair in text.split("|"))
+    return tuple((int(number), meaning) for number, meaning in pairs)
+
+
+_READERS: Mapping[str, Callable[[str], Any]] = {
+    **dict.fromkeys(("minimum", "maximum", "scale", "decimals", "default"), _number),
+    "path": _path,
+    "values": _values,
+    "read_only": bool,
+}
+
+
+def read_numbers(file: Path) -> tuple[Number, ...]:
+    """Return the lines of a table; its columns are fields of `Number`, and an empty cell is the field's default."""
+    with file.open(encoding="ascii", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    return tuple(
+        Number(**{field: _READERS.get(field, str)(text) for field, text in row.items() if text}) for row in rows
+    )
