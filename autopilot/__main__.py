@@ -12,6 +12,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import BlockingReceiver
 from colibri.mavlink.links.open import open_ground_link, open_link
 from colibri.mavlink.links.startup import begin, report_compiling
+from colibri.mavlink.links.udp import UdpLink
 
 
 def command_line() -> ArgumentParser:
@@ -33,17 +34,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run_autopilot(spec: AutopilotSpec, starter: Starter) -> int:
     """Run an autopilot; return the exit code."""
+    link: UdpLink | BlockingReceiver
     if spec.simulator is None:
         link, status, stop = begin("autopilot", spec.plant, starter, open_link)
-        report_compiling(status)
-        from colibri.autopilot.process.run import run
-
-        return run(spec, link, status, stop)
-    simulator, status, stop = begin("autopilot", spec.simulator, starter, open_ground_link)
+    else:
+        simulator, status, stop = begin("autopilot", spec.simulator, starter, open_ground_link)
+        spec, link = replace(spec, feedback=Feedback.SENSORS), BlockingReceiver(simulator)
     report_compiling(status)
     from colibri.autopilot.process.run import run
 
-    return run(replace(spec, feedback=Feedback.SENSORS), BlockingReceiver(simulator), status, stop)
+    return run(spec, link, status, stop)
 
 
 if __name__ == "__main__":

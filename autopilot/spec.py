@@ -82,7 +82,7 @@ class LawSpec:
 
     @property
     def law_name(self) -> str | None:
-        """Name of the control law, or of its class or function; None for the profile's law."""
+        """Name of the control law; None for the profile's law."""
         return self.controller if self.law is None else getattr(self.law, "__name__", type(self.law).__name__)
 
     @property

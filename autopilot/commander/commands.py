@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from math import isnan
+from typing import NamedTuple
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
+from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.motion_commands import MotionCommands, denied
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Condition
@@ -13,6 +15,7 @@ from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint
 from colibri.mavlink.wire.dialect import mav
@@ -25,21 +28,32 @@ _OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
 _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 
 
+class Commanded(NamedTuple):
+    """What commands act on, and what an identity makes of them."""
+
+    pilot: Pilot
+    fence: Fence
+    missions: Missions
+    needs: Needs
+    tasks: ModeTasks
+    parameters: Parameters
+    book: ModeBook = PX4_MODES
+    banner: tuple[str, ...] = ()
+
+
 class Commands:
     """Handlers of the commands of ground stations.
 
     Attributes:
         taken: Takes setpoints, where a mode flies them by itself.
-        exempt: Returns conditions of failsafes without effect in this mode; the radio is then needed in every mode.
+        exempt: Returns failsafes without effect in this mode; the radio is then needed in every mode.
     """
 
-    def __init__(
-        self, pilot: Pilot, fence: Fence, missions: Missions, needs: Needs, book: ModeBook = PX4_MODES
-    ) -> None:
-        self._pilot, self._missions = pilot, missions
-        self._fence, self._needs = fence, needs
+    def __init__(self, parts: Commanded) -> None:
+        pilot, fence, self._missions, needs, *_ = parts
+        self._pilot, self._fence, self._needs = pilot, fence, needs
         self._home = pilot.home
-        self.modes = ModeSelection(book, pilot, needs)
+        self.modes = ModeSelection(parts.book, pilot, needs)
         self.taken: Callable[[OffboardSetpoint | None], None] | None = None
         self.exempt: Callable[[], frozenset[Condition]] | None = None
         self.motion = MotionCommands(pilot, fence, needs)
@@ -88,7 +102,7 @@ class Commands:
         return chosen if isinstance(chosen, Refusal) else self.modes.select(*chosen)
 
     def _start_mission(self, command: ReceivedCommand) -> Refusal | None:
-        """Fly the mission from item p1 on, as in PX4; nan or -1: from the current one. It is flown to its end."""
+        """Fly the mission to its end from item p1, as in PX4; nan or -1: from the current one."""
         first, last, total = command.p1, command.p2, self._missions.total
         if not total:
             return denied("mission", Need.MISSION.value)

@@ -6,18 +6,12 @@ Source: ArduCopter's GCS_MAVLink_Copter.cpp and GCS_Common.cpp, 4.6.
 from collections.abc import Iterator, Mapping
 from math import isnan, radians
 
-from colibri.autopilot.commander.commands import FORCE_MAGIC, Commands
+from colibri.autopilot.commander.commands import FORCE_MAGIC, Commanded, Commands
 from colibri.autopilot.commander.copter_motion import ALT_HOLD, AUTO, CIRCLE, LOITER, POSHOLD, CopterMotion
-from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.missions import Missions
-from colibri.autopilot.commander.mode_selection import Needs
-from colibri.autopilot.commander.mode_tasks import ModeTasks
-from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.rules.shown_modes import ModeBook
 from colibri.autopilot.guidance.tasks.guided import GuidedSettings
-from colibri.mavlink.parameters.store import ParamError, Parameters
+from colibri.mavlink.parameters.store import ParamError
 from colibri.mavlink.services.command import DENIED, FAILED, Handler, ReceivedCommand
 from colibri.mavlink.services.statustext import CRITICAL, INFO
 from colibri.mavlink.wire.dialect import mav
@@ -39,7 +33,7 @@ _EXEMPT = {
     for radio in (False, True)
     for station in (False, True)
 }
-"""Conditions without effect, by whether losses of radio and ground station act."""
+"""Conditions without effect, by whether losses of radio and station act."""
 _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
@@ -55,19 +49,10 @@ _ACCEPTED = (
 class CopterCommands(Commands):
     motion: CopterMotion
 
-    def __init__(
-        self,
-        pilot: Pilot,
-        fence: Fence,
-        missions: Missions,
-        needs: Needs,
-        book: ModeBook,
-        tasks: ModeTasks,
-        parameters: Parameters,
-        banner: tuple[str, ...],
-    ) -> None:
-        super().__init__(pilot, fence, missions, needs, book)
-        self._parameters, self._banner = parameters, banner
+    def __init__(self, parts: Commanded) -> None:
+        super().__init__(parts)
+        pilot, fence, _, needs, tasks, parameters, _, self._banner = parts
+        self._parameters = parameters
         self.motion = CopterMotion(
             pilot, fence, needs, self.modes, lambda: tasks.guided(self._guided_settings), self._circle
         )
@@ -104,7 +89,7 @@ class CopterCommands(Commands):
         return _EXEMPT[radio, station]
 
     def _prearm(self) -> Iterator[str]:
-        """Yield the reasons of ArduCopter's own checks against arming."""
+        """Yield the reasons of ArduCopter's own arming checks."""
         value = self._parameters
         if not value["ARMING_CHECK"]:
             return

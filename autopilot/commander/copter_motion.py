@@ -28,9 +28,9 @@ GUIDED, GUIDED_NOGPS, LOITER, ALT_HOLD, POSHOLD, CIRCLE, AUTO = 4, 20, 5, 2, 16,
 _ABOVE_HOME = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CHANGES_MODE = 1.0
 _ARRIVES_WITHIN_M = 0.3
-"""Distance at which a take-off ends; where sticks take over, it would be missing."""
+"""Distance at which a take-off ends, added where sticks take over."""
 _LIFTING_US = 500_000
-"""Time after a take-off by stick in which it still may become one to a height."""
+"""Time in which a take-off by stick may become one to a height."""
 
 
 class CopterMotion(MotionCommands):
@@ -86,7 +86,7 @@ class CopterMotion(MotionCommands):
         return refusal and refusal._replace(result=FAILED)
 
     def takeoff_by_stick(self, height_m: float) -> None:
-        """Climb to a height above the ground, once the throttle is raised in a mode that holds height."""
+        """Climb to a height above the ground, in modes that hold height."""
         pilot = self._pilot
         lifts = pilot.sensed.now_us - pilot.ground.times.takeoff_us < _LIFTING_US and pilot.state.mode in MANUAL
         if (pilot.ground.standing or lifts) and self._modes.shown.number in (LOITER, POSHOLD, ALT_HOLD):

@@ -16,10 +16,10 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 CHECKED_AT_ONCE = 30_000
-"""Pairs of a place and an edge of the fence; more of them do not fit into the processor's cache."""
+"""Pairs of a place and an edge that fit into the processor's cache."""
 _LOOK_EVERY_US = 100_000
 _ITEM_US, _PAIR_US = 4.0, 0.02
-"""Work to build an item of a fence, and to compare a place with one of its edges."""
+"""Work to build an item, and to compare a place with an edge."""
 
 
 class Fence:
@@ -77,11 +77,11 @@ class Fence:
 
     @property
     def size(self) -> int:
-        """Edges and circles that each place is compared with."""
+        """Number of edges and circles."""
         return self._geofence.size + 1
 
     def first_outside(self, places: Sequence[Vector]) -> tuple[int, Refusal] | None:
-        """Return the index of the first place outside, and why it is; many of them are compared at once."""
+        """Return the index of the first place outside, with the reason."""
         if not self.exists:
             return None
         self.budget.spend(_PAIR_US * len(places) * self.size)
@@ -99,7 +99,7 @@ class Fence:
         return min(self._geofence.margin_m(place), self._around_home.margin_m(place))
 
     def breach(self, place: Vector, now_us: int, margin_m: float) -> Refusal | None:
-        """Check the current position, at 10 Hz because polygons are slow; within the margin arming is refused, too."""
+        """Check the current position, at 10 Hz because polygons are slow."""
         if not self.exists:
             self._breach = self.against_arming = None
         elif now_us >= self._breach_due_us:
@@ -119,7 +119,7 @@ class Fence:
         self.breached_us = now_us
 
     def arming_refusal(self, place: Vector) -> Refusal | None:
-        """Check a position by the fence of this moment, also in the frame in which it is loaded."""
+        """Check a position by the present fence, also just after it was loaded."""
         refusal, margin_m = self.refusal(place), self._arming_margin_m
         if refusal is None and margin_m > 0.0 and self.margin_m(place) < margin_m:
             return Refusal(f"within {margin_m:g} m (GF_MARGIN) of the geofence's edge")

@@ -28,7 +28,7 @@ class Home:
             self.position_enu_m, self.yaw_rad = position_enu_m, yaw_rad
 
     def doubt(self, here: Vector) -> str:
-        """Return why home may be a mistake, for a vehicle that is `here`; empty if it is not."""
+        """Return why home may be a mistake for a vehicle `here`, or an empty text."""
         away, below_m = far(self.position_enu_m, here), -self.position_enu_m[2]
         return f"home: {away}" if away else f"home: {below_m:.0f} m below the ground" if below_m > _DEEP_M else ""
 
@@ -38,10 +38,10 @@ class Home:
         return Refusal(f"{below_m:.1f} m below the ground") if below_m > _UNCERTAIN_M else None
 
     def remark(self, height_m: float) -> str:
-        """Return a warning of a height at which the vehicle scrapes along the ground; empty if it does not."""
+        """Return a warning of a height along the ground, or an empty text."""
         above_m = height_m - min(0.0, self.position_enu_m[2])
         return f"{above_m:.1f} m above home is along the ground" if above_m < _UNCERTAIN_M else ""
 
     def move_origin(self, place: Geodetic) -> None:
-        """Set the origin of the ENU frame; ENU coordinates keep their values."""
+        """Set the origin; ENU coordinates keep their values."""
         self.origin = place

@@ -38,8 +38,8 @@ class Missions:
     """The mission of one vehicle, and the plans around it.
 
     Attributes:
-        unmet: Needs of mode mission that the plan does not meet, each with the item that is the reason.
-        checking: Whether `check_on` is due at the next frame, as the check of a long mission takes several.
+        unmet: Unmet needs of mode mission, with reasons.
+        checking: Whether `check_on` is due, as a long mission takes several frames.
         changes: Number of uploads.
     """
 
@@ -90,7 +90,7 @@ class Missions:
         return self._executor.set_current(seq, reset)
 
     def move_origin(self, place: Geodetic) -> None:
-        """Move the origin, and with it vehicle and home: the places of plans stay where they are on earth."""
+        """Move the origin, vehicle and home; plans stay where they are on earth."""
         moved_m = hypot(*enu_of(place, self._home.origin)[:2])
         self._home.move_origin(place)
         if moved_m > _MOVED_M and (self.total or self._rally or self._fence.loaded):
@@ -124,7 +124,7 @@ class Missions:
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
-        """Continue a mission after a restart, with the current item's turns and remaining legs."""
+        """Continue a mission, with the current item's turns and remaining legs."""
         behaviour = self._behaviour
         self._executor.defaults = Defaults(
             max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
@@ -177,7 +177,7 @@ class Missions:
         )
 
     def check_on(self) -> None:
-        """Check a few more items: at most `CHECKED_AT_ONCE` pairs of a place and an edge of the fence."""
+        """Check more items, at most `CHECKED_AT_ONCE` pairs of a place and an edge."""
         if not self.checking:
             return
         at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
@@ -189,7 +189,7 @@ class Missions:
             self._judge("" if refused is None else _of_item(part[refused[0]][0], refused[1].reason))
 
     def _check_mission(self) -> None:
-        """Begin to find items that cannot be flown to, or may be a mistake; legs between items are not checked."""
+        """Begin to check the items; legs between them are not checked."""
         items, home = self._executor.items, self._home
         self._fence.budget.spend(_PLACE_US * len(items))
         self._found = list(places(items, home.position_enu_m, home.origin))
@@ -197,7 +197,7 @@ class Missions:
         self.check_on()
 
     def _judge(self, outside: str) -> None:
-        """Say which items cannot be flown to, or may be a mistake; `outside` names one outside the fence."""
+        """Report bad items; `outside` names one outside the fence."""
         home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
         flown = [each for each in found if items[each[0]].command not in _ON_THE_GROUND]
@@ -221,7 +221,7 @@ def _first(found: Iterable[tuple[int, Vector]], fault: Callable[[Vector], str]) 
 
 
 def _is_home_first(flown: Sequence[tuple[int, Vector]], home_enu_m: Vector, fault: str) -> bool:
-    """Whether item 0 is home, as in files of ArduPilot, and its height is a fault."""
+    """Whether the fault is of item 0, which is home in files of ArduPilot."""
     first = flown[0] if flown else None
     if first is None or first[0] != 0 or not fault.startswith(_of_item(0, "")):
         return False

@@ -1,4 +1,4 @@
-"""The flight mode that clients selected and see, and the mode of the vehicle that flies it."""
+"""The flight mode that clients see, and the vehicle's mode that flies it."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -25,11 +25,11 @@ class Needs(Protocol):
 
 
 class ModeSelection:
-    """Selects modes by an identity's numbers, and follows the changes that the pilot makes by itself.
+    """Selects modes by an identity's numbers, and follows the pilot's changes.
 
     Attributes:
         shown: The mode that clients see.
-        enters: By number, what begins a mode that no selection of the vehicle's begins.
+        enters: By number, how modes begin that the vehicle does not have.
         base_modes: Of HEARTBEAT without the armed bit: without sticks, and with them.
     """
 
@@ -84,7 +84,7 @@ class ModeSelection:
         return None
 
     def command(self, mode: Mode) -> Refusal | None:
-        """Select the mode that a command names, such as NAV_LAND."""
+        """Select the mode of a command such as NAV_LAND."""
         return self.select(self.book.chosen[mode])
 
     def fly(self, mode: Mode) -> Refusal | None:

@@ -49,7 +49,7 @@ class MotionCommands:
         }
 
     def takeoff_by_stick(self, height_m: float) -> None:
-        """Do nothing: sticks do not begin a take-off to a height."""
+        """Do nothing; ArduCopter has such take-offs."""
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         """Fly to a place; DroneKit uses a mission item for it."""
@@ -62,13 +62,13 @@ class MotionCommands:
         return "" if 0.0 < speed_m_s <= maximum_m_s else f"speed {speed_m_s:g} is not within 0 to {maximum_m_s:g} m/s"
 
     def unreachable(self, *places: Vector) -> Refusal | None:
-        """Refuse places, if one of them is too far away or outside the fence."""
+        """Refuse places if one is too far away or outside the fence."""
         reason = next(filter(None, map(too_far, places)), "")
         outside = None if reason else self._fence.first_outside(places)
         return Refusal(reason) if reason else outside and outside[1]
 
     def read(self, command: ReceivedCommand, *, above_sea: bool = False) -> Vector | Refusal:
-        """Return the place of a command; what is nan is the vehicle's. `above_sea`: except above terrain."""
+        """Return the place of a command, the vehicle's where it is nan."""
         frame = command.frame
         if frame in _NO_FRAME or (above_sea and frame not in ABOVE_TERRAIN):
             frame = mav.MAV_FRAME_GLOBAL
@@ -78,7 +78,7 @@ class MotionCommands:
         return read_place(x, y, z, frame, home_up_m=home.position_enu_m[2], origin=home.origin, here=here)
 
     def warn_elsewhere(self, command: ReceivedCommand, doing: str) -> None:
-        """Warn of a place in a command that is executed where the vehicle is; 0, 0 is here."""
+        """Warn that a command is executed here, not at its place."""
         if (isnan(command.x) and isnan(command.y)) or command.x == command.y == 0.0:
             return
         place, here = self.read(command._replace(z=nan)), self._pilot.context().place
@@ -109,14 +109,14 @@ class MotionCommands:
         return refusal
 
     def _height_of_takeoff(self, command: ReceivedCommand) -> float:
-        """Return z of ENU, m: above home, but above sea level from QGC, which sends a pitch of -1."""
+        """Return z of ENU, m; QGC, which sends a pitch of -1, means above sea level."""
         frame = command.frame
         if frame is None or frame in _NO_FRAME:
             frame = mav.MAV_FRAME_GLOBAL if command.p1 == -1.0 else mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
         return height_m(command.z, frame, self._home.position_enu_m[2], self._home.origin)
 
     def _reposition(self, command: ReceivedCommand) -> Refusal | None:
-        """Fly to a place, or stop if all are nan; the mode-change flag is optional."""
+        """Fly to a place, or stop if all are nan."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return denied("reposition", f"flag {command.p2:g} is not 0 or 1")
         if not (isnan(command.p4) or abs(command.p4) <= MAX_YAW_RAD):
@@ -145,7 +145,7 @@ class MotionCommands:
         return refusal
 
     def warn_of(self, what: str, place: Vector) -> None:
-        """Warn of a place that may be a mistake, but can be flown to."""
+        """Warn of a place that may be a mistake."""
         for remark in (far(place, self._home.position_enu_m), self._home.remark(place[2])):
             if remark:
                 self._pilot.warn(f"{what}: {remark}")
@@ -187,7 +187,7 @@ class MotionCommands:
         return self._home.refusal(z) or self.unreachable(*around)
 
     def _turn(self, command: ReceivedCommand) -> Refusal | None:
-        """Turn to an angle clockwise from north, or from the heading if p4 is 1; p3 is the way, 1 clockwise."""
+        """Turn clockwise from north, or from the heading if p4 is 1; p3 is the direction."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG:
             return denied("turn", f"angle {command.p1:g} is not within {MAX_TURN_DEG:g} degrees")

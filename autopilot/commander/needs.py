@@ -77,7 +77,7 @@ class ModeNeeds:
         return self._pilot.readiness.refusals()
 
     def remark(self, mode: Mode) -> str:
-        """Return what a mode waits for; empty if it waits for nothing."""
+        """Return what a mode waits for, or an empty text."""
         if mode is not Mode.FOLLOW or self.steered(self._now_us).followed is not None:
             return ""
         return self._follow.refusal(self._now_us) or "follow: holds until a FOLLOW_TARGET is received"

@@ -16,7 +16,7 @@ _SECONDS_PER_HOUR = 3600.0
 _MIN_CURRENT_A = 0.01
 _VOLTAGE = "SIM_BATT_VOLTAGE"
 _SAG = 0.03
-"""Tolerance between voltages, as a part of the full voltage: the model's rotors do not lag."""
+"""Tolerance, as a part of the full voltage: the model's rotors do not lag."""
 
 
 class BatteryMonitor:

@@ -1,14 +1,11 @@
-"""The conventions of an identity: one table, read by the services. The identities are in `autopilot/identities`."""
+"""The conventions of an identity as one table; the identities are in `autopilot/identities`."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from colibri.autopilot.commander.commands import Commands
-from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import ModeSelection
-from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
@@ -23,16 +20,6 @@ from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES, Frame
 from colibri.mavlink.streaming.rates import PX4_STREAMS, Streams
 from colibri.mavlink.streaming.service import StreamService
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
-
-
-class Commanded(NamedTuple):
-    pilot: Pilot
-    fence: Fence
-    missions: Missions
-    needs: ModeNeeds
-    tasks: ModeTasks
-    parameters: Parameters
-    book: ModeBook
 
 
 class Served(Protocol):
@@ -58,34 +45,24 @@ Rewrite: TypeAlias = Callable[[str], str]
 """Returns a status text in the words of the emulated program; empty if it sends none."""
 
 
-def _px4_commands(parts: Commanded) -> Commands:
-    return Commands(parts.pilot, parts.fence, parts.missions, parts.needs, parts.book)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conventions:
     """The conventions of an identity.
 
     Attributes:
-        wire: What MAVLink services read.
-        commands: Makes the handlers of commands.
         frames: Local frames of setpoints.
-        streams: Messages, their groups and default rates.
-        radio: Channels of the radio without overrides, us; empty: sticks come by MAVLink alone.
-        parameters: Makes the parameters from Colibri's own, with a system id.
+        radio: Channels without overrides, us; empty: sticks come by MAVLink alone.
+        parameters: Makes the parameters from Colibri's own and a system id.
         folder_suffix: Ending of the parameter file's name.
-        logs: Format of flight logs.
-        booted: Returns the saved parameters as they are after a start.
+        booted: Returns the saved parameters after a start.
         kept_plans: Returns the types of plans that a start does not clear.
-        rewrite: Puts a status text into the program's words.
-        banner: Status texts at the start, beside Colibri's own.
+        banner: Status texts at the start, after Colibri's own.
         describe: Returns the text of a mission item that begins.
-        services: Makes further services.
     """
 
     wire: Identity
     modes: ModeBook = PX4_MODES
-    commands: Callable[[Commanded], Commands] = _px4_commands
+    commands: type[Commands] = Commands
     frames: dict[int, Frame] | None = None
     streams: Streams = PX4_STREAMS
     radio: tuple[int, ...] = ()

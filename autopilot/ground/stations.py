@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, TypeVarTuple
 
-from colibri.autopilot.commander.commands import Commands
+from colibri.autopilot.commander.commands import Commanded, Commands
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
@@ -13,7 +13,7 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.status_queue import StatusQueue
-from colibri.autopilot.ground.conventions import Commanded, Conventions
+from colibri.autopilot.ground.conventions import Conventions
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, LoggedVehicle, OnboardLog
 from colibri.autopilot.ground.system_commands import SystemCommands
@@ -131,7 +131,8 @@ class Stations:
         self.needs = ModeNeeds(pilot, missions, self.manual, self.offboard, self._follow, takes_attitude=takes_attitude)
         self.system = SystemCommands(pilot, missions, parameters, identity=wire, system_id=settings.system_id)
         book = conventions.modes
-        commands = conventions.commands(Commanded(pilot, fence, missions, self.needs, tasks, parameters, book))
+        parts = Commanded(pilot, fence, missions, self.needs, tasks, parameters, book, conventions.banner)
+        commands = conventions.commands(parts)
         self.modes, self.offboard.taken = commands.modes, commands.taken
         self.exempt, self.takeoff_by_stick = commands.exempt, commands.motion.takeoff_by_stick
         vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
@@ -194,7 +195,7 @@ class Stations:
         return self._heartbeat.station_us
 
     def expect_station(self, now_us: int) -> None:
-        """Count a ground station, connected before a restart, as lost from now on."""
+        """Count the station of before a restart as lost from now on."""
         self._heartbeat.station_us = now_us
 
     def update(self, snapshot: TelemetrySnapshot) -> None:
@@ -245,7 +246,7 @@ class Stations:
             self.say(INFO, text)
 
     def refuse_commands(self, reason: str) -> None:
-        """Deny every command, and drop other messages; an empty reason resumes service."""
+        """Deny commands and drop other messages; an empty reason resumes service."""
         self.hub.accepts_only = _COMMANDS if reason else None
         self._obeys.closed = reason
 

@@ -1,4 +1,4 @@
-"""The identities towards ground stations, one file each; only the one that is flown is loaded."""
+"""The identities towards ground stations, a file each, loaded when flown."""
 
 from importlib import import_module
 
@@ -6,6 +6,6 @@ from colibri.autopilot.ground.conventions import Conventions
 
 
 def conventions_of(name: str) -> Conventions:
-    """Return the conventions of an identity: `CONVENTIONS` in the file of its name."""
+    """Return `CONVENTIONS` in the file of an identity's name."""
     found: Conventions = import_module(f"{__name__}.{name}").CONVENTIONS
     return found

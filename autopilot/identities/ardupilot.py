@@ -10,7 +10,7 @@ from re import sub
 from colibri.autopilot.commander.copter_commands import CopterCommands
 from colibri.autopilot.commander.rules.modes import Mode, Need, State
 from colibri.autopilot.commander.rules.shown_modes import CUSTOM, STABILIZED, BaseModes, ModeBook, ShownMode
-from colibri.autopilot.ground.conventions import Commanded, Conventions
+from colibri.autopilot.ground.conventions import Conventions
 from colibri.autopilot.ground.onboard_log import DATAFLASH
 from colibri.autopilot.identities.copter_parameters import booted, copter_parameters
 from colibri.autopilot.identities.copter_services import copter_services
@@ -205,7 +205,7 @@ _ALONG_HEADING = LOCAL_FRAMES[mav.MAV_FRAME_BODY_OFFSET_NED]
 CONVENTIONS = Conventions(
     wire=WIRE,
     modes=MODES,
-    commands=lambda parts: _commands(parts),
+    commands=CopterCommands,
     frames={
         mav.MAV_FRAME_LOCAL_NED: LOCAL_FRAMES[mav.MAV_FRAME_LOCAL_NED],
         mav.MAV_FRAME_LOCAL_OFFSET_NED: LOCAL_FRAMES[mav.MAV_FRAME_LOCAL_OFFSET_NED],
@@ -224,8 +224,3 @@ CONVENTIONS = Conventions(
     describe=_describe,
     services=copter_services,
 )
-
-
-def _commands(parts: Commanded) -> CopterCommands:
-    pilot, fence, missions, needs, tasks, parameters, book = parts
-    return CopterCommands(pilot, fence, missions, needs, book, tasks, parameters, _BANNER)

@@ -1,7 +1,6 @@
 """ArduCopter's parameters, beside Colibri's own: a change under one name shows under the other.
 
-In `arducopter.csv`, the path is the name of the counterpart, where there is one. The parameters of fence and failsafes
-have several.
+In `arducopter.csv`, the path is the name of the counterpart; parameters of fence and failsafes have several.
 Source: ArduCopter 4.6, Parameters.cpp and its libraries, with the defaults of its SITL.
 """
 
@@ -27,9 +26,7 @@ _LINK_ACTIONS_BACK = {0: 0, 1: 7, 2: 1, 3: 5, 5: 5}
 _OURS_FROM_THE_START: Mapping[str, Value] = {"MPC_XY_VEL_MAX": 25.0, "COM_DISARM_LAND": 1.0, "RTL_MIN_DIST": 0.0} | {
     name: 0.0 for name in ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
 }
-"""Speeds are limited by WPNAV_SPEED alone, a landing disarms at once, every return climbs, and batteries are judged by
-voltage.
-"""
+"""WPNAV_SPEED limits speeds, a landing disarms at once, every return climbs, and batteries are judged by voltage."""
 
 
 @cache
@@ -38,7 +35,7 @@ def rows() -> tuple[Number, ...]:
 
 
 def copter_parameters(ours: Iterable[Parameter], system_id: int) -> Parameters:
-    """Return Colibri's parameters and ArduCopter's, with ArduCopter's defaults under both names."""
+    """Return both kinds of parameters, with ArduCopter's defaults."""
     own = {"SYSID_THISMAV": system_id}
     theirs = [
         row.parameter(own.get(row.name, row.default), "ArduCopter", wire=_WIRE.get(row.kind, 0)) for row in rows()

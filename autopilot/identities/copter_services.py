@@ -1,4 +1,4 @@
-"""Services of ArduCopter beside the common ones: texts, version, stream rates, switches of the radio, simulation."""
+"""Services of ArduCopter: texts, version, stream rates, radio switches, simulation."""
 
 from collections.abc import Iterable, Sequence
 from math import radians
@@ -89,7 +89,7 @@ class VersionRequests:
 
 
 class StreamRates:
-    """Keeps requested rates in SR0_*, and streams by them on every channel once they are set."""
+    """Keeps requested rates in SR0_*, and streams by them on every channel."""
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
@@ -227,7 +227,7 @@ class Switches(Polled):
             self._served.say(CRITICAL, refusal.reason)
 
     def _rudder(self, channels: tuple[int, ...], now_us: int, *, armed: bool, manual: bool) -> None:
-        """Arm after two seconds of yaw right with the throttle down, disarm after two to the left."""
+        """Arm after two seconds of full right yaw without throttle, disarm after left."""
         down, yaw = channels[_THROTTLE] <= _DOWN_US, channels[_YAW]
         stick = 0 if not down else 1 if yaw >= _RIGHT_US else -1 if yaw <= _LEFT_US else 0
         if stick != self._stick:

@@ -13,7 +13,7 @@ from colibri.mavlink.parameters.store import Parameter, Parameters, Value
 
 _LINES = read_numbers(Path(__file__).with_name("behaviour.csv"))
 ROWS = tuple(line for line in _LINES if line.path)
-"""Numbers of `Behaviour` and its limits; the lines without a path are what ground stations expect from PX4."""
+"""Numbers of `Behaviour`; lines without a path are only expected by ground stations of PX4."""
 TRACKS = tuple(name for line in ROWS if line.name == "TRACK" for _, name in line.values)
 """Tracks by the number of TRACK."""
 _BEHAVIOUR = Behaviour()

@@ -20,7 +20,7 @@ def with_parameters(
     """Return the profile and the autopilot's vehicle with these parameters.
 
     Raises:
-        ChoiceError: A parameter is unknown or out of range, or acts with ground stations only and none is `served`.
+        ChoiceError: A parameter is unknown, out of range, or needs ground stations, and none is `served`.
         ImpossibleError: The values contradict each other.
     """
     numbers = Numbers(profile, vehicle)

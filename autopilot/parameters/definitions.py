@@ -20,7 +20,7 @@ __all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
 
 _FOLDER = Path(__file__).parent
 DESCRIBED = {"lpv-mpc": read_numbers(_FOLDER / "lpv_mpc.csv")}
-"""Numbers by name of the control law; those of `lpv-mpc` are without its samples, preview and solver."""
+"""Numbers by control law."""
 STRUCTURE = frozenset({"control_interval_s", "qp"})
 """Keys of any control law fixed in flight."""
 _PREFIX_LENGTH = 3
@@ -42,7 +42,7 @@ def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
 
 
 def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
-    """Return the numbers of a vehicle that it models, in its unit of rotor speeds."""
+    """Return the numbers that a vehicle models, in its unit of rotor speeds."""
     speed = tree["rotors"]["speed_unit"]
     inside = f"({speed})" if "/" in speed else speed
     return [

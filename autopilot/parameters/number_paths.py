@@ -86,7 +86,7 @@ def paths(tree: Any, before: NumberPath = ()) -> Iterator[NumberPath]:
 
 
 def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> list[Number]:
-    """Return undescribed numbers, named by prefix and keys, shortened until they fit."""
+    """Return numbers named by prefix and shortened keys."""
     taken: set[str] = set()
     numbers = []
     for path in paths(tree):

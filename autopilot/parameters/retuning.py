@@ -24,7 +24,7 @@ from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, V
 from colibri.plant.vehicle.description import Vehicle
 
 _LAW_US, _SLICE_US, _VALUES_US = 6000.0, 4000.0, 300.0
-"""Work to build and try a control law, a slice of what the trial of its vehicle needs, and to try other parameters."""
+"""Work to build and try a control law, for a slice of a vehicle's trial, and to try other parameters."""
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
 _TRIED = (
     AT_REST,
@@ -84,7 +84,7 @@ class Retuning:
         self.lost: int | None = None
 
     def prepare(self, names: Collection[str], values: Mapping[str, Value]) -> Prepared | ParamError:
-        """Return the control law with all these changes as a `Tuned`, or a refusal; say why one alone is refused."""
+        """Return the changed control law as a `Tuned`, or a refusal."""
         changed = ", ".join(names) if len(names) == 1 else ""
         try:
             if any(name not in self._numbers.defaults for name in names):
@@ -159,7 +159,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly two control samples near hover, and two far from it; by attitude and on the path, too, if the law can."""
+    """Fly four control samples; by attitude and on the path, too, if the law can."""
     references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):

@@ -82,7 +82,7 @@ class PlantClient:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
-        """Write to the log; with ground stations, a failed log does not end the flight."""
+        """Write to the log, whose failure ends only flights without ground stations."""
         if self._log is None:
             return
         try:

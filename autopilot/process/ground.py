@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _REPORT_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 _STANDING_SAMPLES = 50
-"""A disarmed vehicle saves its state at this interval of control samples."""
+"""Control samples between saves while disarmed."""
 
 
 class GroundService:
@@ -113,7 +113,7 @@ class GroundService:
         return self.autopilot.stages
 
     def serve(self, now_s: float) -> Autopilot[Copter]:
-        """Answer ground stations last: acknowledged changes are then on disk, even if the process is killed."""
+        """Answer ground stations last, when acknowledged changes are on disk."""
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
         if self._events:

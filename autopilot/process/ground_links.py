@@ -18,7 +18,7 @@ from colibri.mavlink.streaming.rates import GCS, SDK
 SDK_PORTS = range(14540, 14550)
 """Ports where SDKs wait for PX4; they request no streams, and expect all."""
 SHARE = 0.25
-"""Part of all time for receiving: at real time the control law leaves more than half of a frame idle."""
+"""Part of all time for receiving: the control law leaves more than half of a frame idle."""
 MAX_SAVED_S = 0.005
 _GONE_AFTER_S = 3.5
 """Wall-clock time; ground stations send a HEARTBEAT every second."""
@@ -39,10 +39,7 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
 
 
 class Allowance:
-    """Time budget for received data: a share of all time.
-
-    Senders that exceed it are read less often. Only processor time counts, because other processes are not their fault.
-    """
+    """Time budget for received data, a share of all time; only processor time counts."""
 
     def __init__(self, clock: Clock, processor_clock: Clock) -> None:
         self._clock = clock
@@ -67,8 +64,8 @@ class Allowance:
 class GroundLinks:
     """Carries datagrams between links and a vehicle's hub.
 
-    The owner of the vehicle is who it calls first, on this computer: any program and some web pages reach a port that
-    waits, and whoever sets up the key locks out all others.
+    The owner, who may set up the key, is on the first link, if it calls this computer: any program, and some web
+    pages, reach a port that waits.
     """
 
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
@@ -90,7 +87,7 @@ class GroundLinks:
         stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
     def receive(self, stations: Stations) -> Iterator[Received]:
-        """Yield datagrams within the time budget; excess waits here, then in the system."""
+        """Yield datagrams within the time budget."""
         self._allowance.earn()
         for number, link in enumerate(self._links):
             if not self._waiting[number]:
@@ -104,7 +101,7 @@ class GroundLinks:
                 self._forget(stations, number, address)
 
     def _in_turn(self) -> Iterator[Received]:
-        """Yield from the links in turn, so that a flooded one does not block others."""
+        """Yield from the links in turn, as one may be flooded."""
         while any(self._waiting):
             for number, waiting in enumerate(self._waiting):
                 if not waiting:

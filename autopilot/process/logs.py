@@ -41,9 +41,9 @@ from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
 from colibri.mavlink.ulog.samples import SampleBlocks, SensingBlocks, VehicleStatus, sensing_numbers, status_message
 
 MAX_RECEIVED_BYTES = 64 << 20
-"""Limit of what stations send in the log of a flight: a flood must not fill the disk."""
+"""Limit of logged datagrams: a flood must not fill the disk."""
 MAX_SAID_BYTES = 16 << 20
-"""Limit of status texts: stations cause them, too. Errors are recorded beyond it."""
+"""Limit of status texts below the severity of errors."""
 _FULL = f"stations have sent more than {MAX_RECEIVED_BYTES >> 20} MiB: no more is recorded, a replay ends here"
 _FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _NO_REFERENCES = (nan,) * 11
@@ -160,7 +160,7 @@ class AutopilotLog:
         self._begins = True
 
     def _write_input(self, step: Step, datagram: bytes | None) -> None:
-        """Write the inputs of a replay; frames with only a state follow from the truth."""
+        """Write the inputs of a replay; frames of states follow from the truth."""
         time_us, controls, armed = step.command
         if self._begins:
             self._begins = False
@@ -208,7 +208,7 @@ class AutopilotLog:
 
 
 def log_in(folder: Path, setup: Setup) -> AutopilotLog:
-    """Return the log of a folder; its file is created with the first frame."""
+    """Return a log whose file is created with the first frame."""
     log = AutopilotLog(FileLog(lambda: SharedLog(folder / FILE, log.beginning())), setup)
     return log
 

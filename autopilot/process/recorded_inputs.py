@@ -25,12 +25,10 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     Attributes:
         solver, delay_s: Replace the profile's.
-        track: Flown from the start, without ground stations.
         floor_m: By default the ground.
         boot_unix_us: 0 for simulated time.
         history: Saved state of the flight, after a kill.
         first_us: First answered frame.
-        profile_tables, vehicle_tables: Missing in old logs.
         track_file: Content of the track's file.
     """
 

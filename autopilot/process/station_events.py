@@ -37,7 +37,7 @@ class StationEvents:
         return round(self._coming[0].t * 1e6) if self._coming else _NEVER_US
 
     def due(self, now_us: int) -> list[Encoded]:
-        """Return what is due; a setpoint goes on until the next, or a mode other than offboard."""
+        """Return what is due; a setpoint is repeated until the next, or another mode."""
         due: list[Encoded] = []
         while self._coming_us <= now_us:
             event = self._coming.popleft()
@@ -61,7 +61,7 @@ class StationEvents:
 
 
 class EventStation:
-    """A ground station inside the autopilot's process that sends the events, at their simulated times."""
+    """A ground station in this process that sends the events at their simulated times."""
 
     def __init__(self, events: Iterable[object], system_id: int, signing: Signing) -> None:
         self._events = StationEvents(events, system_id)
@@ -74,7 +74,7 @@ class EventStation:
         stations.use(stations.hub.open(LINK, None), SILENT)
 
     def due(self, now_us: int | None) -> list[Received]:
-        """Return what is due; after a restart in mid-flight, what is past was sent before. None: no estimate yet."""
+        """Return what is due; what is past at a restart was sent before."""
         if now_us is None or now_us < self._events.next_us:
             return []
         if not self._begun and now_us > _BEGINS_WITHIN_US:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from colibri.autopilot.commander.commands import Commands
+from colibri.autopilot.commander.commands import Commanded, Commands
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
@@ -26,6 +26,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem, plan_of
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import Peer
+from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import ACCEPTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -77,7 +78,7 @@ class Cockpit:
         self.pilot = Pilot(planned_at, behaviour, self.tasks.begin, self.home, self.lines)
         self.unmet: tuple[Need, ...] = (Need.CIRCLE,)
         self.engaged: list[tuple[Peer, int]] = []
-        self.commands = Commands(self.pilot, self.fence, self.missions, self)
+        self.commands = Commands(Commanded(self.pilot, self.fence, self.missions, self, self.tasks, Parameters(())))
         self.now_us = 0
         self.state = at(place)
         self.steered: ClientInputs = NOT_STEERED

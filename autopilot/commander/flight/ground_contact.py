@@ -24,7 +24,7 @@ from colibri.mavlink.services.statustext import CRITICAL, INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
-    """Simulated times of the last arming, take-off and landing, 0 before the first, and the number of armings."""
+    """Simulated times of the last events, 0 before the first, and the number of armings."""
 
     armed_us: int = 0
     takeoff_us: int = 0
@@ -33,7 +33,7 @@ class FlightTimes(NamedTuple):
 
 
 class GroundRecord(NamedTuple):
-    """Ground contact for a restart; the fields are attributes of `GroundContact`."""
+    """Attributes of `GroundContact` for a restart."""
 
     standing: bool
     idles: bool
@@ -69,7 +69,7 @@ class GroundContact:
         return GroundRecord(self.standing, self.idles, self.height_m, self.times)
 
     def resume(self, record: GroundRecord, *, came_down: bool) -> None:
-        """Restore the state after a restart; a vehicle that `came_down` meanwhile stands."""
+        """Restore the state; a vehicle that `came_down` meanwhile stands."""
         self.standing, self.idles, self.height_m, self.times = record
         self.standing |= came_down
         self.idles |= came_down
@@ -101,7 +101,7 @@ class GroundContact:
             self._lines.say(NOTICE, "Landing detected")
 
     def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
-        """Detect ground in flight; return whether the vehicle fell to it, below the height that is wanted."""
+        """Detect ground in flight; return whether the vehicle fell below the wanted height."""
         motion, motions = Motion(now_us, vehicle.velocity_enu_m_s), self._motions
         knocked = knock(motions[0], motion, vehicle.position_enu_m[2] - self.height_m) if motions else ""
         if knocked:
@@ -125,7 +125,7 @@ class GroundContact:
             self.land(now_us)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:
-        """Process a sample with the rotors stopped or idling, on the ground or in a fall."""
+        """Process a sample with rotors stopped or idling, also in a fall."""
         self.idles = True
         self._landing, lies = watch(self._landing, now_us, vehicle, sinks=True)
         if not self.standing:

@@ -9,7 +9,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Readiness:
-    """Readiness of one vehicle; failures are texts, empty if none, and `descends` is true under the last-resort law."""
+    """Failures as texts, empty if none; `descends` under the last-resort law."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines

@@ -15,11 +15,11 @@ VOLTAGE_OF = (0.5, 1.2)
 """Bounds of a healthy voltage, relative to the empty and the full voltage."""
 MAX_THRUST_STICK = 0.6
 _SURELY_LEVEL = 0.1
-"""x² + y² of a quaternion tilted by 37 degrees: below, the slow arc cosine is skipped."""
+"""x² + y² of a quaternion at 37 degrees of tilt, below which the slow arc cosine is skipped."""
 
 
 class ArmingInputs(NamedTuple):
-    """Inputs of the arming checks; `charge` and `thrust_stick` are 0..1, texts are reasons, empty if all is well."""
+    """Inputs of the arming checks; charge and stick are 0..1, texts are faults."""
 
     state: VehicleState | None
     standing: bool

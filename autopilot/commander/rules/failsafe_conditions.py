@@ -20,9 +20,9 @@ NEVER_US = -(10**12)
 PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
 """Modes without a need for position."""
 _FROZEN_M, _FROZEN_RAD = 0.05, 0.05
-"""Motion expected from the rates before an unchanged state counts as a fault, not as rounding."""
+"""Motion by the rates beyond which an unchanged state is a fault."""
 _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
-"""Fallbacks after a QP that was not solved, as is recovery if a QP was tried."""
+"""Fallbacks after an unsolved QP; recovery is one if a QP was tried."""
 
 
 class FailsafeInputs(NamedTuple):
@@ -30,14 +30,12 @@ class FailsafeInputs(NamedTuple):
 
     Attributes:
         missed_us: Last frame before a gap.
-        setpoint: The companion's latest, of any age.
         listening_us: Start of listening for clients, by default the restart.
         fence: Returns a place's distance inside every fence, m.
         decided: Diagnostics while the control law is active.
         late: Whether the declared solve time exceeds a control sample.
-        rotor_lost: Index of a failed rotor for which the vehicle must land.
-        needs_radio: Whether the sticks are required in every mode.
-        exempt: Conditions without effect in this mode.
+        rotor_lost: Index of a failed rotor, if the vehicle must land.
+        needs_radio: Whether sticks are required in every mode.
     """
 
     now_us: int
@@ -126,7 +124,7 @@ def resting_place(state: VehicleState, pace: Pace) -> Vector:
 
 
 def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Return the braking distance with bounded acceleration (a trapezoid, or a triangle at low speed) and jerk."""
+    """Return the braking distance with bounded acceleration and jerk."""
     if speed_m_s >= acceleration_m_s2**2 / jerk_m_s3:
         return 0.5 * speed_m_s * (speed_m_s / acceleration_m_s2 + acceleration_m_s2 / jerk_m_s3)
     return speed_m_s * sqrt(speed_m_s / jerk_m_s3)
@@ -213,4 +211,4 @@ SILENT_SINCE: Mapping[Condition, Callable[[FailsafeInputs, bool], int | None]] =
     Condition.STICKS_LOST: _sticks_silent_since,
     Condition.SETPOINTS_LOST: _setpoints_silent_since,
 }
-"""Start of a source's silence, given whether it is already lost: an unneeded stream stays lost until received again."""
+"""Start of a source's silence; a stream that is already lost stays so until received again."""

@@ -8,7 +8,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
 CLEAR_AFTER_US = 1_000_000
-"""A condition is over after not holding this long, so that a flickering link is lost once."""
+"""Time until a condition is over, so that a flickering link is lost once."""
 
 _ORDER = {row.condition: place for place, row in enumerate(TABLE)}
 _SEVERITIES: Mapping[Action, int] = {
@@ -37,12 +37,12 @@ class FlightState(NamedTuple):
 
     @property
     def rank(self) -> Action:
-        """Action that the mode performs anyway: returning includes holding, landing includes returning."""
+        """Action that the mode performs anyway."""
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 
 class FailsafeMemory(NamedTuple):
-    """Memory between samples: when each ongoing condition, past its delay, last held."""
+    """When each ongoing condition, past its delay, last held."""
 
     held_us: Mapping[Condition, int] = {}
     armed: bool = False

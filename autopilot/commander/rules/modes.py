@@ -137,7 +137,7 @@ ROWS = {row.mode: row for row in MODES}
 
 
 class Transition(NamedTuple):
-    """A transition from `sources`, or any if empty, to `target`; None keeps the mode or takes the selected one."""
+    """From `sources`, or any if empty, to `target`; None: the selected or the present mode."""
 
     sources: tuple[Mode, ...]
     event: Event

@@ -1,7 +1,6 @@
-"""Flight modes as clients see them: the number and name of HEARTBEAT, and the modes of the vehicle that fly each.
+"""Flight modes as clients see them.
 
-An identity has a `ModeBook`. PX4's shows every mode of the vehicle as itself; another one may show several modes of the
-vehicle as one, such as ArduPilot's GUIDED, which takes off, flies to places and holds.
+PX4's `ModeBook` shows every mode of the vehicle as itself; another may show several as one, such as ArduPilot's GUIDED.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -24,9 +23,8 @@ class ShownMode(NamedTuple):
 
     Attributes:
         number: HEARTBEAT.custom_mode.
-        flies: Mode of the vehicle that a selection begins; None: the mode is refused by name.
-        covers: Modes of the vehicle that are shown as this one once it is selected.
-        to_arm: Whether clients may arm in it.
+        flies: Mode of the vehicle; None: the mode is refused by name.
+        covers: Modes of the vehicle shown as this one while it is selected.
         guided: Whether the vehicle controls its position.
         waits: Whether a standing vehicle holds until it is told to start.
         standard: MAV_STANDARD_MODE or 0.
@@ -53,17 +51,15 @@ class ModeBook:
 
     Attributes:
         first: Number at the start.
-        chosen: Number selected by a command for a mode of the vehicle, or shown for one that nobody selected.
+        chosen: Number for a mode of the vehicle, by command or unselected.
         saved: Number shown for a failsafe's mode.
         resumed: Number shown where a flight begins in the air.
-        by_command: Returns the number of DO_SET_MODE's parameters 1 to 3, or a refusal.
-        as_command: Returns DO_SET_MODE's parameters 1 to 3 for a number.
-        takeoff: Number of the mode in which an armed vehicle takes NAV_TAKEOFF; None: in any, armed or not.
-        by_message: Returns the number of SET_MODE's base and custom mode, or a refusal.
-        unknown: Returns the refusal of an unknown number, with how the client wrote it.
-        refusal: Returns the refusal of a known mode with its reason.
-        unarmable: Returns the refusal to arm in a mode.
-        base_modes: Returns HEARTBEAT.base_mode of a mode, given the vehicle's state and its number of flights.
+        by_command: Returns the number, and its text, by DO_SET_MODE's parameters 1 to 3.
+        by_message: Returns the same by SET_MODE's base and custom mode.
+        unknown: Returns the refusal of a number by its text.
+        base_modes: Returns HEARTBEAT.base_mode; the number is of flights.
+        as_command: Returns DO_SET_MODE's parameters 1 to 3.
+        takeoff: Mode that NAV_TAKEOFF requires, with arming; None: neither is required.
     """
 
     modes: tuple[ShownMode, ...]
