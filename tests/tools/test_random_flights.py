@@ -32,7 +32,7 @@ def test_an_exception_is_a_failure() -> None:
     thrower = Thrower("autopilot.commander.pilot:Pilot.select", 1)
     thrower.arm()
     try:
-        assert fly(case()).violated.startswith("ChaosError at places.py")
+        assert fly(case()).violated.startswith("ChaosError at flights.py")
     finally:
         thrower.disarm()
 

@@ -70,7 +70,8 @@ def test_the_race_has_25_cells() -> None:
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_flights_of_a_set_can_begin(name: str) -> None:
+def test_flights_of_a_set_can_begin(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 2)
     planned = planned_of(name, laws_of(["se3"]), 1)
     assert check([next(planned.points())], common_of(planned)) == []
 
