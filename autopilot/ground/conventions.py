@@ -16,7 +16,7 @@ from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.service import Service
 from colibri.mavlink.parameters.store import Parameter, Parameters, Value
 from colibri.mavlink.services.identity import Identity
-from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES, Frame
+from colibri.mavlink.setpoints.offboard import Frame
 from colibri.mavlink.streaming.rates import PX4_STREAMS, Streams
 from colibri.mavlink.streaming.service import StreamService
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
@@ -75,7 +75,3 @@ class Conventions:
     banner: tuple[str, ...] = ()
     describe: Callable[[int, MissionItem], str] | None = None
     services: Callable[[Served], Sequence[Service]] = lambda _: ()
-
-    @property
-    def local_frames(self) -> dict[int, Frame]:
-        return self.frames or LOCAL_FRAMES

@@ -43,7 +43,7 @@ from colibri.mavlink.services.statustext import INFO, WARNING, Line, StatusText
 from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.setpoints.follow_target import Follow
 from colibri.mavlink.setpoints.manual_control import Manual
-from colibri.mavlink.setpoints.offboard import Offboard
+from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES, Offboard
 from colibri.mavlink.setpoints.radio import Radio
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
@@ -121,7 +121,7 @@ class Stations:
         self.banner = conventions.banner
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
-        self.offboard = Offboard(self._text, conventions.local_frames)
+        self.offboard = Offboard(self._text, conventions.frames or LOCAL_FRAMES)
         self._follow = Follow(self._text)
         self.manual = Manual(settings.system_id, self._text)
         if conventions.radio:
@@ -147,7 +147,7 @@ class Stations:
             encoders["MISSION_CURRENT"] = lambda _: self.plans.current()
         self.streams = StreamService(encoders, streams)
         modes = StandardModes(
-            [ModeInfo(each.name, each.number, each.standard, each.selectable) for each in book.listed()],
+            [ModeInfo(each.name, each.number, each.standard, each.selectable) for each in book.modes if each.flies],
             lambda number, _: commands.modes.select(number),
         )
         metadata = Metadata(metadata_json(parameters))

@@ -56,16 +56,7 @@ class GroundService:
         self._profile = profile
         self._vehicle = vehicle
         self._status = status
-        self._state = StateFolder(
-            spec.state,
-            profile,
-            vehicle,
-            system_id=spec.system_id,
-            signing_key=spec.signing_key,
-            clock=lambda: tick_at(time()),
-            params=spec.params,
-            conventions=conventions_of(spec.identity),
-        )
+        self._state = StateFolder(spec, profile, vehicle, lambda: tick_at(time()))
         for warning in self._state.warnings:
             status.say("said", f"warning: {warning}")
         self._boot_unix_us = spec.boot_unix_us

@@ -6,9 +6,9 @@ from pathlib import Path
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
-from colibri.autopilot.ground.conventions import Conventions
-from colibri.autopilot.identities.px4 import CONVENTIONS as PX4_CONVENTIONS
+from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import definitions
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.errors import unknown
 from colibri.common.files import private, read_bytes, read_text, regular
 from colibri.common.process.folder_lock import FolderLock
@@ -36,29 +36,14 @@ class GroundError(AutopilotError):
 
 
 class StateFolder:
-    def __init__(
-        self,
-        path: Path | None,
-        profile: Profile,
-        vehicle: Vehicle,
-        *,
-        system_id: int,
-        signing_key: Path | None,
-        clock: Callable[[], int],
-        params: Mapping[str, float] = {},
-        conventions: Conventions = PX4_CONVENTIONS,
-    ) -> None:
-        """Open the folder, or raise FolderInUseError or GroundError.
-
-        `clock` is the wall clock of signatures, `params` are initial values.
-        """
-        self._path = path
-        self._profile = profile
-        self._vehicle = vehicle
-        self._system_id = system_id
-        self._params, self._conventions = params, conventions
+    def __init__(self, spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, clock: Callable[[], int]) -> None:
+        """Open the folder, or raise FolderInUseError or GroundError; `clock` is the wall clock of signatures."""
+        self._path = path = spec.state
+        self._profile, self._vehicle = profile, vehicle
+        self._system_id, self._params = spec.system_id, spec.params
+        self._conventions = conventions_of(spec.identity)
         self.warnings: list[str] = []
-        self.signing = Signing(self._read_key(signing_key), clock, self._read_timestamp())
+        self.signing = Signing(self._read_key(spec.signing_key), clock, self._read_timestamp())
         try:
             self._lock = FolderLock(path, "--state") if path else None
             self.files = Folder(path / FILES) if path else None

@@ -58,80 +58,54 @@ class Event(StrEnum):
     LEFT_STANDING = "no take-off"
 
 
+STANDARD_MODES: Mapping[Mode, int] = {
+    Mode.ALTITUDE: mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
+    Mode.POSITION: mav.MAV_STANDARD_MODE_POSITION_HOLD,
+    Mode.TAKEOFF: mav.MAV_STANDARD_MODE_TAKEOFF,
+    Mode.LAND: mav.MAV_STANDARD_MODE_LAND,
+    Mode.RETURN: mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
+    Mode.MISSION: mav.MAV_STANDARD_MODE_MISSION,
+    Mode.ORBIT: mav.MAV_STANDARD_MODE_ORBIT,
+}
+
+
 class ModeRow(NamedTuple):
-    """A mode with PX4's numbers, its needs in flight, and MAV_STANDARD_MODE or 0."""
+    """A mode with PX4's numbers and its needs in flight."""
 
     mode: Mode
     main: int
     sub: int
     needs: tuple[Need, ...]
     meaning: str
-    standard: int = 0
     to_arm: bool = True
     selectable: bool = True
 
+    @property
+    def standard(self) -> int:
+        """MAV_STANDARD_MODE or 0."""
+        return STANDARD_MODES.get(self.mode, 0)
+
 
 AUTO = 4
+_TILT = (Need.ATTITUDE_CONTROL, Need.STICKS)
+_PLACE = (Need.POSITION,)
+_PLAN = (Need.MISSION, Need.WITHIN_REACH, Need.INSIDE_FENCE, Need.ABOVE_GROUND, Need.POSITION)
+_CIRCLE = (Need.FLYING, Need.CIRCLE, Need.POSITION)
+_HOMEWARD = "climbs, flies to the nearest of home and rally points, and lands"
 
 MODES: tuple[ModeRow, ...] = (
-    ModeRow(Mode.STABILIZED, 7, 0, (Need.ATTITUDE_CONTROL, Need.STICKS), "sticks to tilt, yaw rate and thrust"),
-    ModeRow(
-        Mode.ALTITUDE,
-        2,
-        0,
-        (Need.ATTITUDE_CONTROL, Need.STICKS),
-        "sticks to tilt, yaw rate and climb rate; holds height",
-        mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
-    ),
-    ModeRow(
-        Mode.POSITION,
-        3,
-        0,
-        (Need.STICKS, Need.POSITION),
-        "sticks to velocity; holds position",
-        mav.MAV_STANDARD_MODE_POSITION_HOLD,
-    ),
-    ModeRow(Mode.HOLD, AUTO, 3, (Need.POSITION,), "stops and holds position; flies to reposition commands"),
-    ModeRow(Mode.TAKEOFF, AUTO, 2, (Need.POSITION,), "climbs to the take-off height", mav.MAV_STANDARD_MODE_TAKEOFF),
-    ModeRow(
-        Mode.LAND,
-        AUTO,
-        6,
-        (),
-        "descends here, then disarms; level without position",
-        mav.MAV_STANDARD_MODE_LAND,
-        to_arm=False,
-    ),
-    ModeRow(
-        Mode.RETURN,
-        AUTO,
-        5,
-        (Need.POSITION,),
-        "climbs, flies to the nearest of home and rally points, and lands",
-        mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
-        to_arm=False,
-    ),
-    ModeRow(
-        Mode.MISSION,
-        AUTO,
-        4,
-        (Need.MISSION, Need.WITHIN_REACH, Need.INSIDE_FENCE, Need.ABOVE_GROUND, Need.POSITION),
-        "flies the uploaded mission",
-        mav.MAV_STANDARD_MODE_MISSION,
-    ),
+    ModeRow(Mode.STABILIZED, 7, 0, _TILT, "sticks to tilt, yaw rate and thrust"),
+    ModeRow(Mode.ALTITUDE, 2, 0, _TILT, "sticks to tilt, yaw rate and climb rate; holds height"),
+    ModeRow(Mode.POSITION, 3, 0, (Need.STICKS, Need.POSITION), "sticks to velocity; holds position"),
+    ModeRow(Mode.HOLD, AUTO, 3, _PLACE, "stops and holds position; flies to reposition commands"),
+    ModeRow(Mode.TAKEOFF, AUTO, 2, _PLACE, "climbs to the take-off height"),
+    ModeRow(Mode.LAND, AUTO, 6, (), "descends here, then disarms; level without position", to_arm=False),
+    ModeRow(Mode.RETURN, AUTO, 5, _PLACE, _HOMEWARD, to_arm=False),
+    ModeRow(Mode.MISSION, AUTO, 4, _PLAN, "flies the uploaded mission"),
     ModeRow(Mode.OFFBOARD, 6, 0, (Need.SETPOINTS,), "follows the setpoints of a companion"),
-    ModeRow(
-        Mode.ORBIT,
-        3,
-        1,
-        (Need.FLYING, Need.CIRCLE, Need.POSITION),
-        "flies around a centre",
-        mav.MAV_STANDARD_MODE_ORBIT,
-        to_arm=False,
-        selectable=False,
-    ),
+    ModeRow(Mode.ORBIT, 3, 1, _CIRCLE, "flies around a centre", to_arm=False, selectable=False),
     ModeRow(Mode.FOLLOW, AUTO, 8, (Need.FLYING, Need.POSITION), "follows the target of FOLLOW_TARGET", to_arm=False),
-    ModeRow(Mode.TRACK, AUTO, 11, (Need.POSITION,), "flies the track of parameter TRACK"),
+    ModeRow(Mode.TRACK, AUTO, 11, _PLACE, "flies the track of parameter TRACK"),
 )
 ROWS = {row.mode: row for row in MODES}
 

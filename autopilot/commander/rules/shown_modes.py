@@ -3,7 +3,7 @@
 PX4's `ModeBook` shows every mode of the vehicle as itself; another may show several as one, such as ArduPilot's GUIDED.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -79,9 +79,6 @@ class ModeBook:
     @property
     def numbers(self) -> dict[int, ShownMode]:
         return {mode.number: mode for mode in self.modes}
-
-    def listed(self) -> Iterable[ShownMode]:
-        return (mode for mode in self.modes if mode.flies is not None)
 
 
 def _by_command(p1: float, p2: float, p3: float) -> tuple[int, str] | Refusal:

@@ -122,7 +122,7 @@ def test_the_parameters_that_the_former_name_kept(tmp_path: Path) -> None:
     former = tmp_path / f"whole-{PARAMETERS}"
     former.write_text("1\t1\tWHL_POLE1\t-6\t9\n", encoding="utf-8")
     profile, vehicle = load_profile("flight"), load_vehicle("hummingbird")
-    with closing(StateFolder(tmp_path, profile, vehicle, system_id=1, signing_key=None, clock=lambda: 0)) as folder:
+    with closing(StateFolder(AutopilotSpec(state=tmp_path), profile, vehicle, lambda: 0)) as folder:
         assert folder.parameters() == {"LPV_POLE1": -6.0}
 
 
