@@ -116,10 +116,9 @@ class Fallback(StrEnum):
     THREE_ROTORS = "three rotors"
 
 
+# In logs and telemetry: 0 is solved, -1 without a QP or fallback.
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
-"""QP status in logs and telemetry: 0 is solved, -1 without a QP."""
 FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
-"""Fallback in logs and telemetry; -1 without one."""
 
 
 class Active(NamedTuple):

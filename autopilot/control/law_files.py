@@ -14,8 +14,7 @@ from colibri.common.errors import Error, unknown
 POLICY = ".onnx"
 _MEMBERS = ("initial", "step")
 _provided: dict[str, tuple[str, Any]] = {}
-_modules: dict[Path, tuple[int, ModuleType]] = {}
-"""Loaded files, with the time of their last change."""
+_modules: dict[Path, tuple[int, ModuleType]] = {}  # loaded files, with the time of their last change
 
 
 class LawFileError(AutopilotError):

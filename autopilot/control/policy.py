@@ -23,8 +23,7 @@ from colibri.common.rotations import earth_from_body, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_RATE_LOOP_MS = 5
-"""Longest interval of the loop that holds body rates."""
+_RATE_LOOP_MS = 5  # longest interval of the loop that holds body rates
 _Rate = Annotated[float, msgspec.Meta(ge=0.1, le=50.0)]
 
 

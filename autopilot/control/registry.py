@@ -41,8 +41,7 @@ class BuildError(ControllerError, ForeignError):
     """A control law raised during construction."""
 
 
-Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
-"""(table of the profile, vehicle, clock) -> control law."""
+Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]  # of a profile's table
 
 
 def controller_names() -> list[str]:

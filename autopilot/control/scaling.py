@@ -154,7 +154,6 @@ LAWS: dict[str, tuple[type[Table], dict[str, ScalingRule]]] = {
     "lpv-mpc": (LpvMpcScaling, _LPV_MPC),
     "geometric-se3": (GeometricScaling, _GEOMETRIC),
 }
-"""Scaling and formulas, by the name of the law."""
 
 
 def formulas(law: str) -> dict[str, str]:

@@ -25,8 +25,7 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return QpSolver(self.solver, self.tolerance, self.max_iterations)
 
 
-RENAMED = {"whole-lpv-mpc": "lpv-mpc"}
-"""Names of 0.1, accepted until 0.3."""
+RENAMED = {"whole-lpv-mpc": "lpv-mpc"}  # names of 0.1, accepted until 0.3
 
 
 def current_name(name: str) -> str:

@@ -23,33 +23,24 @@ from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.plant.vehicle.sensors import Sensors
 
+# Time, µs; state (10,) before the test; velocity innovation; time of the last pressure test, µs; its height, m.
 _Fix: TypeAlias = tuple[int, list[float], tuple[float, ...], int, float]
-"""Time, µs; nominal state (10,) before the test; velocity innovation, m/s ENU; time of the last pressure test, µs; its
-height, m."""
 
 TIME, POSITION, VELOCITY, ATTITUDE, INNOVATION, HEIGHT = 0, 1, 4, 7, 11, 14
-ROW = 15
-"""Columns of a fix: time, s, state (10,), velocity innovation, m/s ENU, barometer height, m."""
+ROW = 15  # columns of a fix: time, s, state (10,), velocity innovation, m/s ENU, barometer height, m
 
 _FEWEST_FIXES = 3
-_MAX_WINDOW_US = 2_500_000
-"""Since the first rejected fix: a bias found later is not sudden, and left to the filter's forced acceptance."""
+_MAX_WINDOW_US = 2_500_000  # since the first rejected fix: later, the filter accepts by force
 _KEPT_S = 6.0
-_BEFORE_S, _FEWEST_BEFORE = 1.0, 4
-"""Window before the fault with the reference for the specific force, and its minimum of fixes."""
+_BEFORE_S, _FEWEST_BEFORE = 1.0, 4  # window before the fault for the reference force, and its least fixes
 _ONSET_S = 0.05
 _MAX_GAP_S = 0.35
-_ALONG_PART = 0.5
-"""Part of the bias along body z that requires agreement of the barometer."""
-_ALIKE_PART = 0.5
-"""Two sensors agree if their values differ by at most this part of the larger."""
-_CLEAR = 9.0
-"""Minimum difference between two hypotheses, σ²."""
-_FOUR_SIGMA = 22.06
-"""χ² of three degrees of freedom."""
+_ALONG_PART = 0.5  # part of the bias along body z that requires agreement of the barometer
+_ALIKE_PART = 0.5  # two sensors agree if their values differ by at most this part of the larger
+_CLEAR = 9.0  # minimum difference between two hypotheses, σ²
+_FOUR_SIGMA = 22.06  # χ² of three degrees of freedom
 _MIN_SIGMA = 1e-3
-_STEPS = 4
-"""Least-squares iterations: the error falls by the square of the angle turned."""
+_STEPS = 4  # least-squares iterations: the error falls by the square of the angle turned
 
 
 class DetectedBias(NamedTuple):

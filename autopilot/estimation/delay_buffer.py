@@ -11,10 +11,8 @@ from colibri.autopilot.estimation.sensing.inertial import InertialReading, sampl
 from colibri.common.jit import compiled
 from colibri.common.types import Array, Vector
 
-_FEWEST = 6
-"""Samples that show noise."""
-_BRIDGED_S = 0.1
-"""Longer gaps between frames are crossed without the measurements at their ends."""
+_FEWEST = 6  # samples that show noise
+_BRIDGED_S = 0.1  # longer gaps between frames are crossed without the measurements at their ends
 
 
 class Waiting(NamedTuple):

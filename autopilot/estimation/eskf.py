@@ -40,31 +40,20 @@ from colibri.plant.vehicle.sensors import Sensors
 
 _FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
-_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD, _CAUGHT_YAW_RAD = 3.0, 1.0, 0.4, 1.0
-"""Standard deviations at the start in a fall: the vehicle need not have been level; the heading takes it to be."""
+_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD, _CAUGHT_YAW_RAD = 3.0, 1.0, 0.4, 1.0  # deviations at a start in a fall
 _ITERATIONS = 4
-_UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
-"""Upper triangle of position, velocity and attitude in P."""
-_MIN_NOISE = 1e-6
-"""Lower bound of every noise, in its unit, against division by zero."""
-_PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
-"""Resolutions of HIL_GPS: degE7, mm and cm/s."""
+_UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))  # of position, velocity, attitude
+_MIN_NOISE = 1e-6  # lower bound of every noise, in its unit, against division by zero
+_PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01  # resolutions of HIL_GPS: degE7, mm and cm/s
 _CLAIM_STEP_M = 0.01
 _IRON_WALK_GAUSS = 1e-5
-_SETTLING_US = 10_000_000
-"""After a start in the air."""
-_UNSURE_PART = 0.3
-"""Uncertainty of the position correction after a bias, as a part of it."""
-_UNSURE_TIMES = 3.0
-"""Inflation of the bias variance, because the velocity correction has the same error."""
-_UNSURE_TURN = 2.0
-"""The attitude error may exceed the turn of the field, which does not show a turn about itself."""
-_UNSURE_S = 0.5
-"""Mean duration of the velocity error."""
-_MODELLED_M_S2, _MODELLED_RAD_S = 2.0, 0.2
-"""Errors of a modelled force, by drag in wind and a wrong mass, and of the rate at first."""
-_MISTURNED_RAD = 0.05
-"""Error of the attitude by a gyroscope up to the detection of its failure."""
+_SETTLING_US = 10_000_000  # after a start in the air
+_UNSURE_PART = 0.3  # uncertainty of the position correction after a bias, as a part of it
+_UNSURE_TIMES = 3.0  # inflation of the bias variance, because the velocity correction has the same error
+_UNSURE_TURN = 2.0  # the attitude error may exceed the turn of the field, which does not show a turn about itself
+_UNSURE_S = 0.5  # mean duration of the velocity error
+_MODELLED_M_S2, _MODELLED_RAD_S = 2.0, 0.2  # errors of a modelled force, by drag and mass, and of the rate at first
+_MISTURNED_RAD = 0.05  # error of the attitude by a gyroscope up to the detection of its failure
 _PATIENCE_US = 7_000_000
 _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 

@@ -14,30 +14,22 @@ Three: TypeAlias = tuple[float, float, float]
 Four: TypeAlias = tuple[float, float, float, float]
 Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
+# First index of each part of the error state: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS, GPS_DRIFT, BARO_OFFSET, HARD_IRON = 0, 3, 6, 9, 12, 15, 18, 19
-"""First index of each part of the error state: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU."""
 ERRORS = 22
-NOMINAL = 23
-"""The nominal state has a quaternion for the attitude: later parts are one place later."""
+NOMINAL = 23  # the nominal state has a quaternion for the attitude: later parts are one place later
 
 INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
-SAMPLE = 9
-"""Columns of a sample: duration, s; mean specific force and rate; 1.0 where either is unknown, with velocity or
-attitude then assumed constant; 2.0 where the model of the rotors has replaced it."""
-UNKNOWN, MODELLED = 1.0, 2.0
+SAMPLE = 9  # columns of a sample: duration, s; mean specific force and rate; whether each is unknown or modelled
+UNKNOWN, MODELLED = 1.0, 2.0  # with velocity or attitude constant; replaced by the model of the rotors
 
-_BLIND_FORCE_DENSITY = 3.0**2
-"""(m/s²)²/Hz: 3 m/s after a second without an accelerometer."""
-_BLIND_RATE_DENSITY = 0.5**2
-"""(rad/s)²/Hz."""
-_MODELLED_FORCE_DENSITY, _MODELLED_FORCE_WALK = 0.3**2, 0.5**2
-"""(m/s²)²/Hz and (m/s³)²/Hz: the bias of a modelled force is drag, and the ground's."""
-_MODELLED_RATE_DENSITY, _MODELLED_RATE_WALK = 0.03**2, 0.3**2
-"""(rad/s)²/Hz and (rad/s²)²/Hz: the bias of a modelled rate is the sum of unknown moments."""
-_SMALL_TURN = 0.05
-"""Half turn, rad, below which the series of sine and cosine are exact to the last bits."""
+_BLIND_FORCE_DENSITY = 3.0**2  # (m/s²)²/Hz: 3 m/s after a second without an accelerometer
+_BLIND_RATE_DENSITY = 0.5**2  # (rad/s)²/Hz
+_MODELLED_FORCE_DENSITY, _MODELLED_FORCE_WALK = 0.3**2, 0.5**2  # (m/s²)²/Hz, (m/s³)²/Hz: by drag and ground
+_MODELLED_RATE_DENSITY, _MODELLED_RATE_WALK = 0.03**2, 0.3**2  # (rad/s)²/Hz, (rad/s²)²/Hz: unknown moments
+_SMALL_TURN = 0.05  # half turn, rad, below which the series of sine and cosine are exact to the last bits
+# Beyond these variances a part is unknown and loses its correlations, so that P stays positive.
 _MAX_POSITION_VARIANCE, _MAX_VELOCITY_VARIANCE, _MAX_ATTITUDE_VARIANCE = 1e6, 1e4, 1.0
-"""Variances beyond which a part is unknown and loses its correlations, so that P stays positive."""
 
 
 class Noise(NamedTuple):

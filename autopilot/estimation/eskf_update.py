@@ -22,8 +22,7 @@ from colibri.common.jit import compiled
 from colibri.common.kernels import asin
 from colibri.common.types import Array
 
-_MIN_VARIANCE = 1e-18
-"""Rounding floor of a variance."""
+_MIN_VARIANCE = 1e-18  # rounding floor of a variance
 
 
 @compiled

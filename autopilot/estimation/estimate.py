@@ -24,8 +24,7 @@ class Test(NamedTuple):
         return self.nis / self.gate
 
 
-Tests: TypeAlias = Mapping[str, Test]
-"""Last test of each measurement, by name."""
+Tests: TypeAlias = Mapping[str, Test]  # last test of each measurement, by name
 
 
 _HORIZONTAL_VELOCITY = mav.ESTIMATOR_VELOCITY_HORIZ | mav.ESTIMATOR_POS_HORIZ_REL | mav.ESTIMATOR_PRED_POS_HORIZ_REL

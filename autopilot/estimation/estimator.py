@@ -32,18 +32,14 @@ from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.sensors import Sensors
 
 _SPARE_SAMPLES = 8
-_LATE_US = 1_000_000
-"""A sensor is lost this long after its last accepted measurement."""
-_LEARNING_US = 5_000_000
-"""A bias counts as not yet learned this long after its reset."""
-_MAX_FIX_AGE_S = 0.5
-"""Largest distance of a fix from the filter's time."""
+_LATE_US = 1_000_000  # a sensor is lost this long after its last accepted measurement
+_LEARNING_US = 5_000_000  # a bias counts as not yet learned this long after its reset
+_MAX_FIX_AGE_S = 0.5  # largest distance of a fix from the filter's time
 _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
 _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
-_CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
-"""Between two fixes, because frames with a fix have enough work."""
+_CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000  # between two fixes, because frames with a fix have enough work
 _NOTHING = InertialReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 

@@ -8,10 +8,8 @@ from math import hypot
 
 from colibri.autopilot.estimation.eskf import Filter
 
-_REJECTED_US = 200_000
-"""Required rejection of GPS velocity: three fixes at 10 Hz."""
-_MAX_TURN_RAD = 0.3
-"""Beyond this the field is implausible."""
+_REJECTED_US = 200_000  # required rejection of GPS velocity: three fixes at 10 Hz
+_MAX_TURN_RAD = 0.3  # beyond this the field is implausible
 
 
 def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:

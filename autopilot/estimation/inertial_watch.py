@@ -4,13 +4,10 @@ from colibri.autopilot.estimation.delay_buffer import DelayBuffer, roughness
 from colibri.autopilot.estimation.eskf import Filter
 from colibri.autopilot.estimation.sensing.inertial import Inertial
 
-_ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25
-"""White noise of a sensor that has failed."""
-_ROUGH_CHECKS, _ROUGH_PART = 3, 0.6
-"""In a row, because a knock is rough for one."""
+_ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
+_ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
-_BOTH_REJECTED_US = 300_000
-"""GPS velocity and barometer contradict the same way for so long: the accelerometer is their one common cause."""
+_BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
 
 
 class InertialWatch:

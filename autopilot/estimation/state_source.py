@@ -14,8 +14,7 @@ from colibri.plant.vehicle.description import Vehicle, VehicleError
 if TYPE_CHECKING:
     from colibri.autopilot.estimation.estimator import Estimator
 
-NewEstimator: TypeAlias = Callable[[int], "Estimator"]
-"""Creates an estimator for a frame interval in µs."""
+NewEstimator: TypeAlias = Callable[[int], "Estimator"]  # creates an estimator for a frame interval in µs
 
 
 def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> NewEstimator | None:
@@ -32,8 +31,7 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> New
 
 
 _LATE_US = 1_000_000
-_NO_FIX_AFTER_US = 500_000
-"""Receivers of a few hertz are sometimes late."""
+_NO_FIX_AFTER_US = 500_000  # receivers of a few hertz are sometimes late
 
 
 class StateSource:

@@ -19,13 +19,11 @@ from colibri.common.jit import Packed, compiled
 from colibri.common.matrices import inverse, matmul, norm, put
 from colibri.common.types import Array
 
-PIECES, STRIDE = 28, 8
-"""Pieces of the spline, and control samples of each."""
-SAMPLES = PIECES * STRIDE + 1
-"""Of the references."""
+PIECES, STRIDE = 28, 8  # pieces of the spline, and control samples of each
+SAMPLES = PIECES * STRIDE + 1  # of the references
 
+# Powers of a piece of a cubic B-spline, by its four coefficients.
 _POWERS = np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6.0
-"""Of a piece of a cubic B-spline, by its four coefficients."""
 _FIXED = 5  # what a plan starts from: position, velocity, three coefficients
 _VELOCITY, _BEND = 0.04, 5e-4  # weights; that of the position is 1 for each second
 _LAST, _LAST_VELOCITY = 5.0, 0.5  # of the last knot, added, in parts of a piece

@@ -10,8 +10,7 @@ from colibri.common.rotations import euler_from_quaternion, nearest_turn, rotati
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
-_PASSES, _LEVEL = 6, 1e-9
-"""The rotors' speeds without moments depend on the frame."""
+_PASSES, _LEVEL = 6, 1e-9  # the rotors' speeds without moments depend on the frame
 
 
 def levelled(vehicle: Vehicle) -> tuple[Vehicle, Quaternion | None]:

@@ -11,10 +11,8 @@ from colibri.common.jit import compiled
 from colibri.common.types import Array, PerRotor
 from colibri.plant.vehicle.description import Vehicle
 
-FIXED = 18
-"""Values of an observation before the last action."""
-MAX_POSITION_M, MAX_SPEED_M_S, MAX_RATE_RAD_S = 100.0, 100.0, 100.0
-"""Observations are clipped to these."""
+FIXED = 18  # values of an observation before the last action
+MAX_POSITION_M, MAX_SPEED_M_S, MAX_RATE_RAD_S = 100.0, 100.0, 100.0  # observations are clipped to these
 IDLE, TOP, THRUST, RATES, INERTIA = 0, 1, 2, 3, 6
 _RATE_GAIN_1_S = 20.0
 

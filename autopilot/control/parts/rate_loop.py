@@ -14,10 +14,8 @@ from colibri.common.matrices import matvec
 from colibri.common.types import Array, Vector
 from colibri.plant.vehicle.description import Vehicle
 
-_INTEGRAL = 0.1
-"""Zero of the integral part, in parts of the inverse of the loop's delay."""
-_MOST_INTEGRAL = 0.3
-"""Of the largest moment about each axis."""
+_INTEGRAL = 0.1  # zero of the integral part, in parts of the inverse of the loop's delay
+_MOST_INTEGRAL = 0.3  # of the largest moment about each axis
 
 
 class RateLoop:

@@ -15,13 +15,13 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 Layout: TypeAlias = Literal["px4-x", "px4-+", "betaflight-x", "crazyflie-x"]
+# Bearings of the rotors from the front, degrees, clockwise from above; + turns counter-clockwise.
 LAYOUTS: dict[Layout, tuple[tuple[float, ...], str]] = {
     "px4-x": ((45.0, -135.0, -45.0, 135.0), "++--"),
     "px4-+": ((90.0, -90.0, 0.0, 180.0), "++--"),
     "betaflight-x": ((135.0, 45.0, -135.0, -45.0), "-++-"),
     "crazyflie-x": ((45.0, 135.0, -135.0, -45.0), "+-+-"),
 }
-"""Bearings of the rotors from the front, degrees, clockwise from above, and their turning: + is counter-clockwise."""
 _NEAR_DEG = 20.0
 _TURNS_DEG = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 

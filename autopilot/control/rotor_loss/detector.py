@@ -33,8 +33,6 @@ _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make faili
 _USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
 _DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
-"""Standard deviations of the residual by errors of the model (mass, drag, gusts, weak rotors), in parts of a quarter of
-the weight and its moments. They are far above sensor noise; drag makes moments mostly about z."""
 
 
 class Signature(NamedTuple):

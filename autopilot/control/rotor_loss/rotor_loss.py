@@ -18,11 +18,9 @@ from colibri.plant.vehicle.description import Vehicle
 
 _FOUR = 4
 MAX_INTERVAL_S = 0.02  # longest control interval for the landing: half a radian at four turns a second
-_CLEAR_M, _CLEAR_INVERTED_M = 0.3, 5.0
-"""Least height for detection. Ground presses an inverted vehicle as a lost rotor does; the estimated height may err."""
+_CLEAR_M, _CLEAR_INVERTED_M = 0.3, 5.0  # height for detection: ground presses an inverted vehicle as a loss does
 
-Laws: TypeAlias = tuple[ReducedAttitude, ...]
-"""One law for the loss of each rotor, (4,); none for more rotors."""
+Laws: TypeAlias = tuple[ReducedAttitude, ...]  # one law for the loss of each rotor, (4,); none for more rotors
 
 
 @lru_cache(maxsize=16)

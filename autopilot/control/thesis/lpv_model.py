@@ -10,8 +10,7 @@ from colibri.common.types import Array
 
 Discretisation: TypeAlias = Literal["zero-order-hold", "forward-euler"]
 
-ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0, 0, 1.0, 0]])
-"""C: the outputs phi, theta, psi of the state [phi phi' theta theta' psi psi']."""
+ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0, 0, 1.0, 0]])  # C: phi, theta, psi
 
 
 def attitude_model(
@@ -33,8 +32,7 @@ def attitude_model(
     return A, B
 
 
-GLOBAL_OUTPUT = np.zeros((4, 12))
-"""C: the outputs x, y, z, psi of the state [x x' y y' z z' phi phi' theta theta' psi psi']."""
+GLOBAL_OUTPUT = np.zeros((4, 12))  # C: x, y, z, psi
 GLOBAL_OUTPUT[[0, 1, 2, 3], [0, 2, 4, 10]] = 1.0
 
 

@@ -16,10 +16,8 @@ from colibri.common.kernels import exp
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-ESTIMATES = 12
-"""Velocity, m/s (ENU); body rates, rad/s; disturbances: acceleration, m/s² (ENU), and moment, N m."""
-MEASURED = 9
-"""Velocity, m/s (ENU); body rates, rad/s; body z axis (ENU)."""
+ESTIMATES = 12  # velocity, m/s (ENU); body rates, rad/s; disturbances: acceleration, m/s² (ENU), and moment, N m
+MEASURED = 9  # velocity, m/s (ENU); body rates, rad/s; body z axis (ENU)
 
 
 class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -16,8 +16,7 @@ from colibri.common.matrices import dot, inverse, matmul, matvec
 from colibri.common.types import Array, PerRotor
 from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
 
-_EVEN, _PRIORITY = (1.0, 1.0, 1.0, 1.0), (1.0, 10.0, 10.0, 0.2)
-"""Weights of thrust, roll, pitch and yaw, each in parts of what the rotors can set: first for what can be reached."""
+_EVEN, _PRIORITY = (1.0, 1.0, 1.0, 1.0), (1.0, 10.0, 10.0, 0.2)  # weights of thrust, roll, pitch, yaw; even first
 _SWEEPS, _REGULAR, _REACHED = 400, 1e-7, 2e-3
 _YAW_PART = 0.02
 

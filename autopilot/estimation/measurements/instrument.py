@@ -9,8 +9,7 @@ from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.vehicle.sensors import Sensors
 
-Value: TypeAlias = tuple[float, ...]
-"""Measurement at one instant, in SI."""
+Value: TypeAlias = tuple[float, ...]  # measurement at one instant, in SI
 
 
 class Ratio(IntEnum):

@@ -10,8 +10,7 @@ from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.estimate import Test
 from colibri.common.types import Array
 
-FIVE_SIGMA = (25.0, 28.74, 31.81)
-"""χ² of one, two and three degrees of freedom, as improbable as five standard deviations."""
+FIVE_SIGMA = (25.0, 28.74, 31.81)  # χ² of one, two and three degrees of freedom, as improbable as 5 σ
 
 
 class KindRecord(NamedTuple):

@@ -19,17 +19,13 @@ from colibri.plant.vehicle.sensors import Sensors
 _MAX_GAUSS = 4.0
 _FROZEN_US = 500_000
 _MIN_NOISE_GAUSS = 1e-6
-_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
-"""Allowed deviations from the earth's field in strength and inclination."""
+_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)  # allowed deviations from the earth's field in strength and inclination
 _PATIENCE_US = 10_000_000
 _INFLATED_GAUSS = 0.3
 _MEAN_S = 1.0
-_DRIFT_SIGMAS, _DRIFT_GAUSS = 8.0, 0.004
-"""The mean strength has drifted if its deviation exceeds both."""
-_DOUBT_SIGMAS, _DOUBT_GAUSS = 20.0, 0.004
-"""The mean innovation contradicts the model if it exceeds both; without failures it stays below 10 deviations."""
-_DOUBT_RAD_S, _DOUBT_IRON_GAUSS = 0.02, 0.1
-"""What the gyroscope's bias and the vehicle's own field may then have become."""
+_DRIFT_SIGMAS, _DRIFT_GAUSS = 8.0, 0.004  # the mean strength has drifted if its deviation exceeds both
+_DOUBT_SIGMAS, _DOUBT_GAUSS = 20.0, 0.004  # of a mean innovation that contradicts the model; healthy: below 10
+_DOUBT_RAD_S, _DOUBT_IRON_GAUSS = 0.02, 0.1  # what gyroscope bias and own field may then have become
 
 
 class MagnetometerFusion(FusedInstrument):

@@ -21,10 +21,8 @@ from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.sensors import Sensors
 
-_USED_BELOW_M = 5.0
-"""Height limit, as PX4's EKF2_RNG_A_HMAX: higher up, the ground may differ from that at the start."""
-_MIN_COSINE = 0.7
-"""Of the tilt: beyond 45° the beam meets the ground elsewhere."""
+_USED_BELOW_M = 5.0  # height limit, as PX4's EKF2_RNG_A_HMAX: higher up, the ground may differ from that at the start
+_MIN_COSINE = 0.7  # of the tilt: beyond 45° the beam meets the ground elsewhere
 _ROUGHNESS_M = 0.01
 _WIRE_STEP_M = 0.01
 _FROZEN_US = 500_000

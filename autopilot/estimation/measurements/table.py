@@ -7,17 +7,15 @@ from colibri.autopilot.estimation.measurements.rangefinder import RangefinderBel
 from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
+# In the order of fusion within an instant; every vehicle has the first two.
 ROWS: tuple[type[FusedInstrument], ...] = (MagnetometerFusion, BarometerFusion, RangefinderBelow)
-"""In the order of fusion within an instant; every vehicle has the first two."""
 
-GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}
-"""The three measurements of a fix."""
-KINDS: dict[str, int] = {
+GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}  # the three measurements of a fix
+KINDS: dict[str, int] = {  # numbers in each measurement, in the order of logs
     **GPS_KINDS,
     BarometerFusion.name: BarometerFusion.numbers,
     **{row.name: row.numbers for row in ROWS},
 }
-"""Values in each kind of measurement, in the order of logs and tables."""
 RATIOS: dict[str, Ratio] = {
     "velocity": Ratio.VELOCITY,
     "position": Ratio.POSITION,

@@ -16,14 +16,11 @@ WINDOW_S = 1.0
 
 _FEWEST_SAMPLES = 20
 _FEWEST_FIELDS = 5
-_UNREST = 3.0
-"""Allowed spread at rest: this multiple of the sensor noise, plus the next two."""
+_UNREST = 3.0  # allowed spread at rest: this multiple of the sensor noise, plus the next two
 _UNREST_M_S2, _UNREST_RAD_S = 0.1, 0.01
-_BIASES = 5.0
-"""Allowed deviation of a mean at rest: this multiple of the turn-on bias, plus the next two."""
+_BIASES = 5.0  # allowed deviation of a mean at rest: this multiple of the turn-on bias, plus the next two
 _TILT_M_S2, _TURN_RAD_S = 0.3, 0.04
-_FIELD_PART = 0.25
-"""Allowed deviation of the field strength from the earth's."""
+_FIELD_PART = 0.25  # allowed deviation of the field strength from the earth's
 
 
 class Aligned(NamedTuple):

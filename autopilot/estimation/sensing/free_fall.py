@@ -14,12 +14,10 @@ from colibri.autopilot.estimation.sensing.inertial import InertialReading
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix
 
-_FALLS_PART = 0.35
-"""Of gravity: largest specific force in a fall with stopped rotors, apart from storms."""
+_FALLS_PART = 0.35  # of gravity: largest specific force in a fall with stopped rotors, apart from storms
 _FALLS_FOR_US = 40_000
 _SINKS_M_S = 0.5
-_SURELY_US = 400_000
-"""GPS shows a fall late; after this time it is not required, so that a rising vehicle is caught too."""
+_SURELY_US = 400_000  # after this GPS need not show the fall, so that a rising vehicle is caught too
 _UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -10,21 +10,15 @@ from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
 
-Expected: TypeAlias = tuple[float, float, float, float]
-"""Specific force along z, m/s², and angular acceleration, rad/s², FLU, by the model of the rotors."""
-Sample = tuple[float, ...]
-"""Columns of `eskf_predict.SAMPLE`."""
+Expected: TypeAlias = tuple[float, float, float, float]  # specific force along z, angular acceleration, FLU
+Sample = tuple[float, ...]  # columns of `eskf_predict.SAMPLE`
 
-_BEYOND_RANGE = 1.01
-"""Tolerance for resolution at the end of the range."""
+_BEYOND_RANGE = 1.01  # tolerance for resolution at the end of the range
 _PATIENCE_US = 100_000
-_BRIDGED_US = 20_000
-"""Validity of the last good value when values are missing."""
-_NOISY_1_S = 10.0
-"""Bandwidth at which the model follows a noisy gyroscope."""
+_BRIDGED_US = 20_000  # validity of the last good value when values are missing
+_NOISY_1_S = 10.0  # bandwidth at which the model follows a noisy gyroscope
 _MAX_STEP_S = 0.02
-_FAILED_US = 100_000
-"""A sensor without values for so long has failed: those that come later may be late."""
+_FAILED_US = 100_000  # a sensor without values for so long has failed: those that come later may be late
 
 
 class InertialSensor:

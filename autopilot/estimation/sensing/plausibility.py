@@ -10,11 +10,9 @@ _MAX_SPEED_M_S = 100.0
 _MIN_HEIGHT_M, _MAX_HEIGHT_M = -1000.0, 30e3
 _MIN_FIX, _BEST_FIX = 3, 6
 _GPS_PATIENCE_US = 2_000_000
-_NOWHERE = (0.0, 0.0)
-"""Latitude and longitude of receivers without a fix."""
+_NOWHERE = (0.0, 0.0)  # latitude and longitude of receivers without a fix
 MAX_GAP_US = 1_000_000
-_SETTLED = 25
-"""Frames out of sequence after which the clock counts as reset."""
+_SETTLED = 25  # frames out of sequence after which the clock counts as reset
 
 
 class Watch:
