@@ -31,7 +31,6 @@ from colibri.mavlink.ulog.flight_topics import (
     FILTER,
     MEASURED,
     MORE_COMMAND,
-    ROTORS,
     split,
 )
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
@@ -56,9 +55,9 @@ class AutopilotLog:
         self.topics, self._setup = topics, setup
         self._begins = True
         self._time_us = self._received_bytes = self._said_bytes = 0
-        sensors = setup.vehicle_tables and setup.vehicle_tables.sensors
-        self._kinds = kinds_of(sensors) if sensors else []
-        self._rotors = setup.vehicle_tables.rotors.count if setup.vehicle_tables else ROTORS
+        vehicle = setup.vehicle_tables
+        self._kinds = kinds_of(vehicle.sensors) if vehicle.sensors else []
+        self._rotors = vehicle.rotors.count
         self._recorder: Recorder | None = None
         self._views: tuple[SampleBlocks, SensingBlocks] | None = None
         if topics.for_viewers and not setup.ground:
@@ -95,17 +94,15 @@ class AutopilotLog:
                 self._view(*self._views, step, decided)
 
     def follow(self, parameters: Parameters) -> None:
-        vehicle = self._setup.vehicle_tables
-        name = self._setup.vehicle if vehicle is None else vehicle.name
+        name = self._setup.vehicle_tables.name
         self._recorder = Recorder(self.topics, name, self._setup.system_id, parameters, with_battery=False)
 
     def beginning(self) -> bytes:
         if self._recorder is not None:
             return self._recorder.begin()
-        profile, vehicle = self._setup.profile_tables, self._setup.vehicle_tables
-        if profile is None or vehicle is None:
-            return beginning(self._setup.vehicle, {})
-        return beginning(vehicle.name, Parameters(definitions(profile, vehicle, self._setup.system_id)).values)
+        setup, vehicle = self._setup, self._setup.vehicle_tables
+        known = definitions(setup.profile_tables, vehicle, setup.system_id)
+        return beginning(vehicle.name, Parameters(known).values)
 
     def write_snapshot(self, snapshot: TelemetrySnapshot) -> None:
         if self._recorder is not None:

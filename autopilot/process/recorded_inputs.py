@@ -48,8 +48,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     values: dict[str, Value] = {}
     history: bytes = b""
     first_us: int = 0
-    profile_tables: Profile | None = None
-    vehicle_tables: Vehicle | None = None
+    profile_tables: Profile
+    vehicle_tables: Vehicle
     track_file: str | None = None
 
 

@@ -134,7 +134,7 @@ def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
     true: StateFrame | None = None
-    rotors = setup.vehicle_tables.rotors.count if setup.vehicle_tables else ROTORS
+    rotors = setup.vehicle_tables.rotors.count
     others = (row[1:] for block in flight.log.blocks(MORE_COMMAND) for row in block.tolist())
     for time_s, *controls, armed in (row for block in flight.log.blocks(COMMAND) for row in block.tolist()):
         if rotors > ROTORS:
@@ -224,10 +224,10 @@ def _changed(setups: Iterable[Setup]) -> list[str]:
     for setup in setups:
         with suppress(Error):
             now = load_profile(setup.profile).with_choices(setup.controller, setup.solver, setup.delay_s)
-            if setup.profile_tables not in (None, now):
+            if setup.profile_tables != now:
                 changed.append(f"profile {setup.profile}")
         with suppress(Error):
-            if setup.vehicle_tables not in (None, load_vehicle(setup.vehicle)):
+            if setup.vehicle_tables != load_vehicle(setup.vehicle):
                 changed.append(f"vehicle {setup.vehicle}")
     return list(dict.fromkeys(changed))
 
@@ -245,9 +245,8 @@ def _ended_us(flight: _Flight) -> int:
 
 
 def _begun(setup: Setup) -> Autopilot[Any]:
-    tables = setup.profile_tables or load_profile(setup.profile)
-    profile = tables.with_choices(setup.controller, setup.solver, setup.delay_s)
-    vehicle = setup.vehicle_tables or load_vehicle(setup.vehicle)
+    profile = setup.profile_tables.with_choices(setup.controller, setup.solver, setup.delay_s)
+    vehicle = setup.vehicle_tables
     flown = None
     if setup.track is not None:
         flown = load_track(setup.track, vehicle, profile, setup.floor_m, setup.track_file).track

@@ -1,4 +1,4 @@
-"""Numbers that parameters set; tables of them are CSV files with a line for each parameter."""
+"""Numbers that parameters set, and their tables: CSV files with a line for each."""
 
 import csv
 from collections.abc import Callable, Mapping
@@ -15,8 +15,8 @@ class Number(NamedTuple):
     """A parameter for the number at `path`, which is `scale` times its value.
 
     Attributes:
-        kind: Type on the wire: b, h or i for integers of 8, 16 or 32 bits, f for a float; empty: by the default.
-        values: Valid values with meanings, if not all are valid; in a file `0=Off|1=On`.
+        kind: Integer of 8 (b), 16 (h) or 32 (i) bits, or float (f); empty: by the default.
+        values: Valid values with meanings, if not all; in a file `0=Off|1=On`.
     """
 
     name: str
@@ -75,7 +75,7 @@ _READERS: Mapping[str, Callable[[str], Any]] = {
 
 
 def read_numbers(file: Path) -> tuple[Number, ...]:
-    """Return the lines of a table; its columns are fields of `Number`, and an empty cell is the field's default."""
+    """Return the lines of a table, whose columns are fields of `Number`."""
     with file.open(encoding="ascii", newline="") as lines:
         rows = list(csv.DictReader(lines))
     return tuple(

@@ -1,5 +1,6 @@
 import pytest
 
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.process import logs
 from colibri.autopilot.process.logs import AutopilotLog
@@ -9,6 +10,7 @@ from colibri.common.process.log_files import LogError
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.services.statustext import ERROR, WARNING
 from colibri.mavlink.ulog.log import TopicLog
+from colibri.plant.vehicle.description import load_vehicle
 
 SETUP = Setup(
     profile="flight",
@@ -21,6 +23,8 @@ SETUP = Setup(
     system_id=1,
     identity="px4",
     ground=True,
+    profile_tables=load_profile("flight"),
+    vehicle_tables=load_vehicle("hummingbird"),
 )
 
 
