@@ -15,7 +15,7 @@ Limits: TypeAlias = Mapping[str, float]
 GROUP = "Failsafes"
 _US = 1e6
 _CHOICES = {row.parameter: row for row in TABLE}
-_LINES = read_numbers(Path(__file__).with_name("failsafes.csv"))
+_LINES = read_numbers(Path(__file__).with_name("failsafe_parameters.csv"))
 NUMBERS = tuple(line for line in _LINES if line.name not in _CHOICES)
 """Limits and delays; the other lines are actions, whose numbers are in the table of failsafes."""
 ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
