@@ -1,4 +1,4 @@
-"""ArduCopter's commands: modes by its rules, missions, fence, servos, and the results that its clients expect.
+"""ArduCopter's commands, with the results that its clients expect.
 
 Source: ArduCopter's GCS_MAVLink_Copter.cpp and GCS_Common.cpp, 4.6.
 """

@@ -1,4 +1,4 @@
-"""Commands to move, as ArduCopter takes them: most in mode GUIDED, by one task that keeps its setpoint.
+"""ArduCopter's commands to move, most of them in mode GUIDED.
 
 Source: ArduCopter's GCS_MAVLink_Copter.cpp and mode_guided.cpp, 4.6.
 """
@@ -140,7 +140,7 @@ class CopterMotion(MotionCommands):
         return None
 
     def circle(self) -> Refusal | None:
-        """Fly mode CIRCLE around the point ahead, facing it; a rate of 0 only faces it."""
+        """Fly around the point ahead, facing it; a rate of 0 only faces it."""
         context, (radius_m, speed_m_s) = self._pilot.context(), self._circle()
         (x, y, z), yaw_rad = context.place, context.yaw_rad
         center: Vector = (x + radius_m * cos(yaw_rad), y + radius_m * sin(yaw_rad), z)

@@ -40,7 +40,6 @@ class Missions:
     Attributes:
         unmet: Unmet needs of mode mission, with reasons.
         checking: Whether `check_on` is due, as a long mission takes several frames.
-        changes: Number of uploads.
     """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
@@ -109,7 +108,7 @@ class Missions:
         self._check_mission()
 
     def homeward(self, context: TaskContext, *, tells: bool = True) -> TaskSequence:
-        """Return to the nearest of home and the rally points inside the fence, as PX4 does."""
+        """Return to the nearest of home and the rally points inside the fence."""
         places = [context.home_enu_m]
         for _, place in rally_places(self._rally, context.home_enu_m, self._home.origin):
             if not self._rally_fault(place):

@@ -28,7 +28,6 @@ class ModeSelection:
     """Selects modes by an identity's numbers, and follows the pilot's changes.
 
     Attributes:
-        shown: The mode that clients see.
         enters: By number, how modes begin that the vehicle does not have.
         base_modes: Of HEARTBEAT without the armed bit: without sticks, and with them.
     """

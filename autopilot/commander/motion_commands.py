@@ -155,7 +155,7 @@ class MotionCommands:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
     def _orbit(self, command: ReceivedCommand) -> Refusal | None:
-        """Fly a circle; z is above sea level, as in MAVSDK and PX4, except in frames above terrain."""
+        """Fly a circle; z is above sea level, as in PX4, except in frames above terrain."""
         pilot = self._pilot
         if not self._flies:
             return denied("orbit", NOT_FLYING)

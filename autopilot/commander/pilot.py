@@ -92,7 +92,6 @@ class Pilot:
     """State machine of mode, task and failsafe; each method is an event.
 
     Attributes:
-        lag_us: Lag of path time.
         speed_m_s: Requested cruise speed; None for the parameters'.
         saving: Active failsafe, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
@@ -120,10 +119,7 @@ class Pilot:
     def begin(
         self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False, delay_us: int = 0
     ) -> None:
-        """Start a flight, standing or airborne.
-
-        A vehicle estimated at rest (`rests`) stands at any height, because estimated heights are inexact.
-        """
+        """Start a flight; a vehicle that `rests` stands at any height, because estimated heights are inexact."""
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle, delay_us=delay_us)
         standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.generator.follow(vehicle)
@@ -151,9 +147,9 @@ class Pilot:
     def resume(
         self, now_us: int, vehicle: VehicleState, record: PilotRecord, again: TaskFactory, *, seamless: bool
     ) -> None:
-        """Restore the state after a restart; a vehicle that came down stays on the ground.
+        """Restore the state; `again` returns the task that continues a mode.
 
-        `again` returns the task that continues a mode. A `seamless` restart took no time and keeps the reference.
+        A vehicle that came down stays on the ground. A `seamless` restart keeps the reference.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.move(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
@@ -221,10 +217,8 @@ class Pilot:
         reasons = [] if forced else self.readiness.refusals()
         if reasons:
             return Refusal("Arming denied: " + "; ".join(reasons))
-        unmet: dict[Need, str] = {
-            need: why for need, why in missing.items() if need is not Need.POSITION
-        }  # a check of its own, and by force
-        refusal = self._follow(Event.ARM, "Armed", missing=unmet)
+        # position has a check of its own, which force skips
+        refusal = self._follow(Event.ARM, "Armed", missing=_without(Need.POSITION, missing))
         if refusal is None:
             now_us, vehicle, *_ = self.sensed
             self.ground.arm(now_us)
@@ -253,9 +247,7 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, task: FlightTask, missing: Mapping[Need, str]) -> Refusal | None:
-        refusal = self._follow(
-            Event.SELECT, "", mode, {need: why for need, why in missing.items() if need is not Need.CIRCLE}
-        )
+        refusal = self._follow(Event.SELECT, "", mode, _without(Need.CIRCLE, missing))
         if refusal is None:
             self.saving = Action.NONE
             self.task, self._task_is_chosen = task, True
@@ -377,3 +369,7 @@ class Pilot:
             self._lines.say(INFO, text.format(before=self.state.mode.capitalize(), mode=after.mode))
         self.state = after
         return None
+
+
+def _without(met: Need, missing: Mapping[Need, str]) -> dict[Need, str]:
+    return {need: why for need, why in missing.items() if need is not met}

@@ -1,1 +1,1 @@
-"""The vehicle as ground stations see it: services on one hub, snapshots, battery, injected faults."""
+"""The vehicle as ground stations see it."""

@@ -20,11 +20,7 @@ _SAG = 0.03
 
 
 class BatteryMonitor:
-    """Integrates the charge taken from one battery.
-
-    Attributes:
-        battery: `None` if the vehicle, or the plant as it reports, has none.
-    """
+    """Integrates the charge taken; `battery` is None if the vehicle, or the plant, has none."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._model = BatteryModel(vehicle)

@@ -50,7 +50,6 @@ class Conventions:
     """The conventions of an identity.
 
     Attributes:
-        frames: Local frames of setpoints.
         radio: Channels without overrides, us; empty: sticks come by MAVLink alone.
         parameters: Makes the parameters from Colibri's own and a system id.
         folder_suffix: Ending of the parameter file's name.

@@ -1,7 +1,6 @@
 """ArduPilot's conventions: ArduCopter 4.6 as its SITL has them.
 
-Sources: ArduCopter's mode.h, GCS_Copter.cpp and GCS_MAVLink_Copter.cpp, 4.6. Modes that Colibri does not fly are
-refused by name.
+Sources: ArduCopter's mode.h, GCS_Copter.cpp and GCS_MAVLink_Copter.cpp, 4.6.
 """
 
 from collections.abc import Collection

@@ -38,7 +38,7 @@ _STREAMS = {
 
 
 class Greeter:
-    """Sends every new client the texts of the start that tools wait for."""
+    """Sends new clients the texts that tools wait for."""
 
     handles = _KNOWN_BY
 
@@ -164,7 +164,7 @@ class PreArm(Polled):
 
 
 class Switches(Polled):
-    """Modes by the mode switch and by switches with a function, and arming by the yaw stick."""
+    """Selects modes by switches, and arms by the yaw stick."""
 
     def __init__(self, served: Served) -> None:
         super().__init__(served)

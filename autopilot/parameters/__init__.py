@@ -1,1 +1,1 @@
-"""Parameters of control law, vehicle, behaviour and failsafes, and the law rebuilt on a change."""
+"""Parameters, and the control law that is rebuilt on a change."""

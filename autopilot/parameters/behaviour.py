@@ -37,7 +37,6 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
-    """Return the behaviour's parameters, and those that ground stations expect from PX4."""
     numbers = {line.name: _default(line) if line.path else line.default for line in _LINES}
     numbers["MAV_SYS_ID"] = system_id
     return [line.parameter(numbers[line.name]) for line in _LINES]

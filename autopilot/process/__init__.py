@@ -1,1 +1,1 @@
-"""The autopilot as a process: frames, logs, ground links, state on disk."""
+"""The autopilot as a process."""

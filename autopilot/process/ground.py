@@ -90,7 +90,6 @@ class GroundService:
         self._reported_s = self._saved_s = perf_counter()
         self._reported_us = 0
         self._sources: set[tuple[str, str]] = set()
-        self._mode: tuple[str, bool] | None = None
         for number, link in enumerate(links):
             self._status.say("ground", _invitation(link.url), url=link.url, link=number)
 

@@ -1,4 +1,4 @@
-"""Which events of a flight a ground station sends; starts fast, as launchers ask, too."""
+"""Events that a ground station sends; loads fast, for launchers."""
 
 from collections.abc import Iterable
 

@@ -42,12 +42,7 @@ class GroundRecord(NamedTuple):
 
 
 class GroundContact:
-    """Ground contact of one vehicle.
-
-    Attributes:
-        height_m: z of ENU at the last standing position.
-        impact: The last contact as text; empty for a landing.
-    """
+    """Ground contact of one vehicle; `impact` is text, empty for a landing, `height_m` the last z of ENU on ground."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines

@@ -1,4 +1,4 @@
-"""The reference generator: moves the reference to a task's target, and previews it."""
+"""Moves the reference to a task's target, and previews it."""
 
 from typing import NamedTuple
 

@@ -26,7 +26,7 @@ class ShownMode(NamedTuple):
         flies: Mode of the vehicle; None: the mode is refused by name.
         covers: Modes of the vehicle shown as this one while it is selected.
         guided: Whether the vehicle controls its position.
-        waits: Whether a standing vehicle holds until it is told to start.
+        waits: Whether a standing vehicle waits for a start.
         standard: MAV_STANDARD_MODE or 0.
     """
 
@@ -50,7 +50,6 @@ class ModeBook:
     """The flight modes of an identity.
 
     Attributes:
-        first: Number at the start.
         chosen: Number for a mode of the vehicle, by command or unselected.
         saved: Number shown for a failsafe's mode.
         resumed: Number shown where a flight begins in the air.
