@@ -40,7 +40,7 @@ TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 
 
 class TaskRecord(NamedTuple):
-    """State of a task for the checkpoint: order, track start, turns flown, remaining legs."""
+    """State of a task for the checkpoint; `legs` are those that remain."""
 
     order: OrderRecord | None = None
     began_us: int | None = None

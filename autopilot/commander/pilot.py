@@ -61,7 +61,7 @@ class Sensed(NamedTuple):
     Attributes:
         waited_us: Path time lost since the previous sample.
         path_speed: Rate of path time relative to the clock.
-        lift: Modelled thrust in parts of weight, where a sensor has failed in this flight.
+        lift: Modelled thrust over weight, once a sensor has failed.
     """
 
     now_us: int = 0

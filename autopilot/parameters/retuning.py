@@ -59,11 +59,7 @@ class Tuned(NamedTuple):
 
 
 class Retuning:
-    """Rejects changes with which the control law cannot be built or fly.
-
-    Attributes:
-        lost: The rotor without which laws are built.
-    """
+    """Rejects changes with which the control law cannot be built, without the rotor `lost`, or fly."""
 
     def __init__(
         self,

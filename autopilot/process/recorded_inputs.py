@@ -29,7 +29,6 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         boot_unix_us: 0 for simulated time.
         history: Saved state of the flight, after a kill.
         first_us: First answered frame.
-        track_file: Content of the track's file.
     """
 
     profile: str

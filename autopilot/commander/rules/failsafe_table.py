@@ -57,13 +57,7 @@ class Condition(StrEnum):
 
 
 class FailsafeRow(NamedTuple):
-    """A failsafe; its texts and parameters appear on the page.
-
-    Attributes:
-        grounded: Whether it is also watched on the ground.
-        kept: Whether it holds until the rotors stop.
-        reported: False if its detector reports it.
-    """
+    """A failsafe, `grounded` if watched on the ground, too, `kept` until the rotors stop, `reported` to stations."""
 
     condition: Condition
     holds: str
