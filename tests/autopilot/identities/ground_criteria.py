@@ -10,6 +10,8 @@ from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.autopilot.identities.copter_words import (
     ACCEPTED,
+    ALT_HOLD,
+    BRAKE,
     CIRCLE,
     DENIED,
     FAILED,
@@ -103,6 +105,31 @@ def set_home(sitl: Sitl) -> None:
         back = home()
         assert dist((back.latitude, back.longitude), (first.latitude, first.longitude)) < 100
         sitl.gcs.order_int(mav.MAV_CMD_DO_SET_HOME, frame=GLOBAL, x=x, y=y, z=z)
+
+
+def mode_switch(sitl: Sitl) -> None:
+    """Slot 5 has STABILIZE where ArduPilot's test has ACRO, which is refused here."""
+    widths = (1165, 1295, 1425, 1555, 1685, 1815)
+    modes = dict(zip(widths, (GUIDED, ALT_HOLD, RTL, CIRCLE, STABILIZE, BRAKE), strict=True))
+    for width in (*widths, *widths[::-1], *widths):
+        steered(sitl, 1.0, c5=width)
+        in_mode(sitl, modes[width])
+
+
+def global_origin(sitl: Sitl) -> None:
+    def origin(x: int, y: int, z: float) -> int:
+        return sitl.gcs.order_int(mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN, frame=GLOBAL, x=x, y=y, z=z)
+
+    before = latest(sitl, "GPS_GLOBAL_ORIGIN")
+    for x, y in ((0, 0), (0, 2140000000), (914564321, 0)):
+        assert origin(x, y, 0.0) == DENIED, (x, y)
+    assert latest(sitl, "GPS_GLOBAL_ORIGIN").latitude == before.latitude
+    x, y, z = -35 * 10**7 - 1234567, 149 * 10**7 + 7654321, 642.5
+    assert origin(x, y, z) == ACCEPTED
+    sitl.run(0.05)
+    shown = latest(sitl, "GPS_GLOBAL_ORIGIN")
+    got = shown.latitude, shown.longitude, shown.altitude
+    assert got == (x, y, round(z * 1e3)), f"{got}"
 
 
 def aux_switches(sitl: Sitl) -> None:
