@@ -32,6 +32,7 @@ _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of in
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
 _DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
+# Deviations of the residual by errors of the model, in parts of a quarter of the weight and its moments.
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 
 
