@@ -46,7 +46,7 @@ class Commands:
 
     Attributes:
         taken: Takes setpoints, where a mode flies them by itself.
-        exempt: Returns failsafes without effect in this mode; the radio is then needed in every mode.
+        exempt: Returns failsafes without action in this mode; the radio is then needed in every mode.
     """
 
     def __init__(self, parts: Commanded) -> None:
@@ -55,7 +55,7 @@ class Commands:
         self._home = pilot.home
         self.modes = ModeSelection(parts.book, pilot, needs)
         self.taken: Callable[[OffboardSetpoint | None], None] | None = None
-        self.exempt: Callable[[], frozenset[Condition]] | None = None
+        self.exempt: Callable[[], Mapping[Condition, str]] | None = None
         self.motion = MotionCommands(pilot, fence, needs)
 
     def handlers(self) -> Mapping[int, Handler]:

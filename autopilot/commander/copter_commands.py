@@ -22,18 +22,15 @@ DO_AUX_FUNCTION, DO_SEND_BANNER = 218, 42428
 _BY_THRUST, _YAW_STAYS = 8, 0
 _MAX_SPIN = 0.3
 _ALT_MAX, _CIRCLE = 1, 2
-_AUTO_BY_RADIO, _AUTO_BY_STATION, _GUIDED_BY_RADIO, _LANDING, _PILOT_BY_STATION = 1, 2, 4, 8, 16
-"""FS_OPTIONS."""
 LAND = 9
-_BY_PILOT = (0, ALT_HOLD, LOITER, POSHOLD)
-_EXEMPT = {
-    (radio, station): frozenset(
-        condition for condition, acts in ((Condition.STICKS_LOST, radio), (Condition.STATION_LOST, station)) if not acts
-    )
-    for radio in (False, True)
-    for station in (False, True)
+_RADIO, _STATION = Condition.STICKS_LOST, Condition.STATION_LOST
+_CONTINUES_GUIDED = ((4, _RADIO, "Guided Mode"),)
+_CONTINUES = {
+    AUTO: ((1, _RADIO, "Auto"), (2, _STATION, "Auto Mode")),
+    LAND: ((8, _RADIO, "Landing"), (8, _STATION, "Landing")),
+    **dict.fromkeys((0, ALT_HOLD, LOITER, POSHOLD), ((16, _STATION, "Pilot Control"),)),
 }
-"""Conditions without effect, by whether losses of radio and station act."""
+"""What continues in spite of a loss, by mode and bit of FS_OPTIONS."""
 _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
@@ -74,19 +71,15 @@ class CopterCommands(Commands):
         radius_m = max(0.01 * self._parameters["CIRCLE_RADIUS"], 1.0)
         return radius_m, radians(self._parameters["CIRCLE_RATE"]) * radius_m
 
-    def _exempt(self) -> frozenset[Condition]:
-        """Return the losses without effect, by FS_OPTIONS and the FS_*_ENABLE: events.cpp."""
-        value, number = self._parameters, self.modes.shown.number
-        options, radio, station = int(value["FS_OPTIONS"]), bool(value["FS_THR_ENABLE"]), True
-        if number == AUTO:
-            radio, station = radio and not options & _AUTO_BY_RADIO, not options & _AUTO_BY_STATION
-        elif self.motion.guided:
-            radio = radio and not options & _GUIDED_BY_RADIO
-        elif number == LAND and options & _LANDING:
-            radio = station = False
-        elif number in _BY_PILOT and options & _PILOT_BY_STATION:
-            station = False
-        return _EXEMPT[radio, station]
+    def _exempt(self) -> Mapping[Condition, str]:
+        """Return the losses without action and what continues, by FS_OPTIONS and FS_THR_ENABLE: events.cpp."""
+        value = self._parameters
+        options = int(value["FS_OPTIONS"])
+        rows = _CONTINUES_GUIDED if self.motion.guided else _CONTINUES.get(self.modes.shown.number, ())
+        exempt = {loss: continues for bit, loss, continues in rows if options & bit}
+        if not value["FS_THR_ENABLE"]:
+            exempt[_RADIO] = ""
+        return exempt
 
     def _prearm(self) -> Iterator[str]:
         """Yield the reasons of ArduCopter's own arming checks."""

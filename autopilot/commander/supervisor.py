@@ -36,7 +36,9 @@ class Supervisor:
     def step(self, inputs: FailsafeInputs, flight: FlightState) -> Action:
         """Return the action to begin, before the pilot's step."""
         since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
-        self.memory, action, lines = following(self.memory, inputs.now_us, since_us, self._settings, flight)
+        self.memory, action, lines = following(
+            self.memory, inputs.now_us, since_us, self._settings, flight, inputs.exempt
+        )
         for severity, text in lines:
             self._lines.say(severity, text)
         return action

@@ -1,5 +1,8 @@
 """Supervision at each control sample: lost rotors, setpoints of clients, failsafes."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from colibri.autopilot.commander.pilot import Sensed
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
@@ -11,7 +14,7 @@ from colibri.autopilot.guidance.tasks.task import NOT_STEERED, ClientInputs
 
 _EVER_US = 10**15
 _LANDS = (Mode.LAND, Mode.RETURN)
-_NOTHING: frozenset[Condition] = frozenset()
+_NOTHING: Mapping[Condition, str] = MappingProxyType({})
 _KNOWN_TILT_RAD, _CATCHING_US = 0.035, 3_000_000
 """A vehicle caught in a fall drifts until its tilt is known so well, or for so long."""
 

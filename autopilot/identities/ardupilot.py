@@ -159,6 +159,8 @@ _TEXTS = (
     (r"^(Arm|PreArm): more than [\d.]+ m (from|above) home", r"\1: Vehicle breaching fence"),
     (r"^Failsafe cleared: ground station lost", "GCS Failsafe Cleared"),
     (r"^Failsafe cleared: sticks lost", "Radio Failsafe Cleared"),
+    (r"^Warning: ground station lost, continuing ", "GCS Failsafe - Continuing "),
+    (r"^Warning: sticks lost, continuing ", "Radio Failsafe - Continuing "),
     (r"^(Failsafe activated|Failsafe): ground station lost.*", "GCS Failsafe"),
     (r"^(Failsafe activated|Failsafe): sticks lost.*", "Radio Failsafe"),
     (r"^(Failsafe activated|Failsafe|Warning): battery (low|critical).*", r"Battery 1 is \2"),

@@ -36,6 +36,7 @@ class FailsafeInputs(NamedTuple):
         late: Whether the declared solve time exceeds a control sample.
         rotor_lost: Index of a failed rotor, if the vehicle must land.
         needs_radio: Whether sticks are required in every mode.
+        exempt: Conditions that are reported only, with what continues; without effect if that is empty.
     """
 
     now_us: int
@@ -55,7 +56,7 @@ class FailsafeInputs(NamedTuple):
     rotor_lost: int | None
     pace: Pace
     needs_radio: bool = False
-    exempt: frozenset[Condition] = frozenset()
+    exempt: Mapping[Condition, str] = {}
 
 
 class Conditions:
@@ -80,8 +81,9 @@ class Conditions:
             for condition, lost in SENSORS.items():
                 if lost(inputs.estimate.health):
                     found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
-        for condition in inputs.exempt:
-            found.pop(condition, None)
+        for condition, continues in inputs.exempt.items():
+            if not continues:
+                found.pop(condition, None)
         frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:
             found[Condition.ATTITUDE_LOST] = frozen_us

@@ -1,6 +1,7 @@
 """The failsafe rule: only a higher-ranked action replaces the active one."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, FailsafeRow
@@ -20,6 +21,8 @@ _SEVERITIES: Mapping[Action, int] = {
     Action.TERMINATE: EMERGENCY,
 }
 _RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.LAND}
+
+_NOTHING: Mapping[Condition, str] = MappingProxyType({})
 
 
 class FailsafeSetting(NamedTuple):
@@ -62,8 +65,11 @@ def following(
     since_us: Mapping[Condition, int],
     settings: Mapping[Condition, FailsafeSetting],
     flight: FlightState,
+    exempt: Mapping[Condition, str] = _NOTHING,
 ) -> FailsafeDecision:
     """Decide which failsafes begin and end; arming restarts all holding conditions.
+
+    `exempt` conditions are reported only, with what continues.
 
     An action begins with its condition: a mode selected later stays until another condition begins.
     """
@@ -87,16 +93,20 @@ def following(
             cleared.append((NOTICE, f"Failsafe cleared: {condition}"))
     if not begun:
         return FailsafeDecision(FailsafeMemory(held_us, flight.armed), Action.NONE, tuple(cleared))
-    action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
+    wanted = [(row, Action.WARN if row.condition in exempt else settings[row.condition].action) for row in begun]
+    action, lines = _begin(wanted, flight, exempt)
     return FailsafeDecision(FailsafeMemory(held_us, flight.armed), action, (*lines, *cleared))
 
 
-def _begin(begun: list[tuple[FailsafeRow, Action]], flight: FlightState) -> tuple[Action, list[tuple[int, str]]]:
+def _begin(
+    begun: list[tuple[FailsafeRow, Action]], flight: FlightState, exempt: Mapping[Condition, str]
+) -> tuple[Action, list[tuple[int, str]]]:
     begins, lines = Action.NONE, []
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)
         if action is Action.WARN:
-            lines.append((WARNING, f"Warning: {row.condition}" + (f", {row.warns}" if row.warns else "")))
+            words = f"continuing {exempt[row.condition]}" if row.condition in exempt else row.warns
+            lines.append((WARNING, f"Warning: {row.condition}" + (f", {words}" if words else "")))
         elif action > max(begins, flight.rank):
             begins = action
             if row.reported:

@@ -7,6 +7,7 @@ from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.autopilot.identities.copter_words import (
     ACCEPTED,
+    ALT_HOLD,
     AUTO,
     BRAKE,
     FAILED,
@@ -99,7 +100,7 @@ def radio_failsafe(sitl: Sitl) -> None:
     sitl.set_param("SIM_RC_FAIL", 1)
     sitl.wait_until(lambda: not sitl.armed, within=2.0)
     sitl.set_param("SIM_RC_FAIL", 0)
-    for action, mode in ((1, RTL), (3, LAND)):
+    for action, mode in ((1, RTL), (3, LAND), (4, RTL), (5, LAND)):
         sitl.set_param("FS_THR_ENABLE", action)
         sitl.takeoff(10.0)
         sitl.set_param("SIM_RC_FAIL", 1)
@@ -108,15 +109,67 @@ def radio_failsafe(sitl: Sitl) -> None:
         sitl.run(2.0)
         assert shown(sitl) == mode
         home_and_disarmed(sitl)
-    sitl.set_param("FS_OPTIONS", 4)
+
+
+def _outbound(sitl: Sitl, mode: int) -> None:
+    """Fly at 10 m, in AUTO to a place far away."""
+    if mode == AUTO:
+        upload(sitl, items.takeoff(10.0), items.waypoint(0.0, 500.0, 10.0))
+        in_auto(sitl)
+        sitl.wait_until(lambda: height(sitl) > 9.0, within=30.0)
+        return
     sitl.takeoff(10.0)
-    sitl.set_param("SIM_RC_FAIL", 1)
-    sitl.run(3.0)
-    assert shown(sitl) == GUIDED
+    steered(sitl, 0.5, c3=1500)
+    assert sitl.command(mav.MAV_CMD_DO_SET_MODE, 1.0, mode) == ACCEPTED
+
+
+def losses_in_spite_of_which_a_mode_continues(sitl: Sitl) -> None:
+    for option, mode, station, words in (
+        (4, GUIDED, False, "Radio Failsafe - Continuing Guided Mode"),
+        (1, AUTO, False, "Radio Failsafe - Continuing Auto"),
+        (2, AUTO, True, "GCS Failsafe - Continuing Auto Mode"),
+        (8, LAND, True, "GCS Failsafe - Continuing Landing"),
+        (16, ALT_HOLD, True, "GCS Failsafe - Continuing Pilot Control"),
+        (0, AUTO, True, ""),
+        (0, GUIDED, False, ""),
+    ):
+        sitl.set_param("FS_OPTIONS", option)
+        sitl.set_param("FS_GCS_ENABLE", int(station))
+        _outbound(sitl, mode)
+        if station:
+            sitl.gcs.silent = True
+        else:
+            sitl.set_param("SIM_RC_FAIL", 1)
+        sitl.run(7.0)
+        sitl.gcs.silent = False
+        assert shown(sitl) == (mode if words else RTL), option
+        sitl.set_param("SIM_RC_FAIL", 0)
+        says(sitl, words or "Failsafe", 5.0)
+        says(sitl, f"{'GCS' if station else 'Radio'} Failsafe Cleared", 5.0)
+        sitl.gcs.texts.clear()
+        sitl.select("LAND")
+        sitl.wait_until(lambda: not sitl.armed, within=60.0)
+
+
+def bad_fences(sitl: Sitl) -> None:
+    corners = ((40.0, 40.0, 0.0), (40.0, 20.0, 0.0), (20.0, 20.0, 0.0), (20.0, 40.0, 0.0))
+    vertex = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+    sitl.upload_fence([items.Item(vertex, (4.0, 0.0, 0.0, 0.0), place=place) for place in corners])
+    for sets, words in (
+        ({"FENCE_TYPE": 4}, "Vehicle breaching Polygon fence"),
+        ({"FENCE_TYPE": 2, "FENCE_RADIUS": -1}, "Invalid Circle FENCE_RADIUS value"),
+        ({"FENCE_TYPE": 1, "FENCE_ALT_MAX": -1}, "Invalid FENCE_ALT_MAX value"),
+    ):
+        for name, value in sets.items():
+            sitl.set_param(name, value)
+        sitl.set_param("FENCE_ENABLE", 1)
+        sitl.command(mav.MAV_CMD_RUN_PREARM_CHECKS)
+        says(sitl, f"PreArm: {words}", 5.0)
+        assert sitl.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == FAILED
 
 
 def station_failsafe(sitl: Sitl) -> None:
-    for action, mode in ((1, RTL), (5, LAND)):
+    for action, mode in ((1, RTL), (3, RTL), (4, RTL), (5, LAND), (99, RTL)):
         sitl.set_param("FS_GCS_ENABLE", action)
         sitl.takeoff(10.0)
         sitl.gcs.silent = True
@@ -149,6 +202,13 @@ def battery_failsafe(sitl: Sitl) -> None:
     in_mode(sitl, LAND, 20.0)
     says(sitl, "Battery 1 is critical")
     assert charge_state() == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    home_and_disarmed(sitl)
+    sitl.set_param("SIM_BATT_VOLTAGE", 12.5)
+    sitl.set_param("BATT_FS_LOW_ACT", 5)
+    sitl.run(3.0)
+    sitl.takeoff(3.0)
+    sitl.set_param("SIM_BATT_VOLTAGE", 11.4)
+    sitl.wait_until(lambda: not sitl.armed, within=20.0)
 
 
 def without_receiver(sitl: Sitl) -> None:

@@ -13,11 +13,13 @@ import pytest
 from colibri.sitl.vehicle import Sitl
 from tests.autopilot.identities.copter_words import CIRCLE, Check
 from tests.autopilot.identities.failsafe_criteria import (
+    bad_fences,
     battery_failsafe,
     circle_fence,
     disarming,
     floor_fence,
     height_fence,
+    losses_in_spite_of_which_a_mode_continues,
     motor_test,
     radio_failsafe,
     return_at_height,
@@ -127,10 +129,12 @@ ROWS = (
     Row(37, "RTLSpeed, RTL_ALT_FINAL", return_at_height, {"RTL_SPEED": 700, "RTL_ALT_FINAL": 1000}),
     Row(38, "RTL_TO_RALLY", return_to_rally, {"RALLY_INCL_HOME": 0}),
     Row(39, "HorizontalFence", circle_fence, {"FENCE_TYPE": 2, "FENCE_RADIUS": 50}),
+    Row(39, "HorizontalFence before arming", bad_fences, quick=True),
     Row(40, "MaxAltFence", height_fence, {"FENCE_TYPE": 1, "FENCE_ALT_MAX": 20}),
     Row(40, "MinAltFence", floor_fence, {"FENCE_TYPE": 8, "FENCE_ALT_MIN": 10}),
     Row(41, "ThrottleFailsafe", radio_failsafe),
     Row(42, "GCSFailsafe", station_failsafe),
+    Row(42, "ThrottleFailsafe, GCSFailsafe by FS_OPTIONS", losses_in_spite_of_which_a_mode_continues),
     Row(43, "BatteryFailsafe", battery_failsafe, {"BATT_LOW_VOLT": 11.5, "BATT_CRT_VOLT": 10.1, "BATT_LOW_TIMER": 1}),
     Row(44, "AutoContinueOnRCFailsafe, RCOverridesNoRCReceiver", without_receiver, {"FS_OPTIONS": 5}),
     Row(45, "StabilityPatch", weak_motor),
