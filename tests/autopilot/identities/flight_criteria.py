@@ -318,6 +318,17 @@ def velocities(sitl: Sitl) -> None:
         sitl.wait_until(lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.3, within=3.0)  # type: ignore[misc]
         velocity(sitl, north, east, down)
         held(sitl, lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.5, 2.0, "velocity")  # type: ignore[misc]
+    for frame in (0, 3, 5, 6, 10, 11):
+        for north in (1.0, -1.0):
+            target = (0, 1, 1, frame, 3527, 0, 0, 0.0, north, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            sitl.send("SET_POSITION_TARGET_GLOBAL_INT", *target)
+            wanted = (0.0, north, 0.0)
+            sitl.wait_until(lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.3, within=5.0)  # type: ignore[misc]
+    bad = (0, 1, 1, 6, 3527, 0, 0, 0.0, 1.0, -3.6e30, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    sitl.send("SET_POSITION_TARGET_GLOBAL_INT", *bad)
+    sitl.wait_until(lambda: hypot(*sitl.velocity) < 0.3, within=2.5)
+    velocity(sitl, 1.0, 0.0, 0.0)
+    sitl.run(1.0)
     velocity(sitl, 1.0, -3.6e30, 0.0)
     sitl.wait_until(lambda: hypot(*sitl.velocity) < 0.3, within=5.0)
     held(sitl, lambda: hypot(*sitl.velocity) < 0.3, 10.0, "standing")
