@@ -50,13 +50,9 @@ class Conventions:
     """The conventions of an identity.
 
     Attributes:
-        radio: Channels without overrides, us; empty: sticks come by MAVLink alone.
         parameters: Makes the parameters from Colibri's own and a system id.
-        folder_suffix: Ending of the parameter file's name.
         booted: Returns the saved parameters after a start.
         kept_plans: Returns the types of plans that a start does not clear.
-        banner: Status texts at the start, after Colibri's own.
-        describe: Returns the text of a mission item that begins.
     """
 
     wire: Identity
@@ -64,13 +60,13 @@ class Conventions:
     commands: type[Commands] = Commands
     frames: dict[int, Frame] | None = None
     streams: Streams = PX4_STREAMS
-    radio: tuple[int, ...] = ()
+    radio: tuple[int, ...] = ()  # channels without overrides, us; empty: sticks come by MAVLink alone
     parameters: Callable[[Iterable[Parameter], int], Parameters] = lambda ours, _: Parameters(ours)
-    folder_suffix: str = ""
+    folder_suffix: str = ""  # ending of the parameter file's name
     logs: LogFormat = ULOG
     booted: Callable[[dict[str, Value]], dict[str, Value]] = lambda values: values
     kept_plans: Callable[[Parameters], Collection[int]] = lambda _: ()
     rewrite: Rewrite = str
-    banner: tuple[str, ...] = ()
-    describe: Callable[[int, MissionItem], str] | None = None
+    banner: tuple[str, ...] = ()  # status texts at the start, after Colibri's own
+    describe: Callable[[int, MissionItem], str] | None = None  # returns the text of a mission item that begins
     services: Callable[[Served], Sequence[Service]] = lambda _: ()

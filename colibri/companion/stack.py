@@ -104,47 +104,36 @@ class Response(NamedTuple):
     Assumed time constants are short: too long a one costs stability, too short a one only bandwidth.
 
     Attributes:
-        time_constant_s: The rate loop demands the acceleration (command - rate) / time constant.
-        latency_s: From a command's arrival to its first effect.
         max_rate_rad_s, max_acceleration_rad_s2: Limits in the stack.
-        acceleration_lag_s: 0 for first order.
     """
 
-    time_constant_s: Vector
-    latency_s: float
+    time_constant_s: Vector  # the rate loop demands the acceleration (command - rate) / time constant
+    latency_s: float  # from a command's arrival to its first effect
     thrust_lag_s: float
     max_rate_rad_s: Vector
     max_acceleration_rad_s2: Vector
-    acceleration_lag_s: Vector = (0.0, 0.0, 0.0)
+    acceleration_lag_s: Vector = (0.0, 0.0, 0.0)  # 0 for first order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stack:
-    """A flight stack.
-
-    Attributes:
-        steady: `custom_mode` of modes that permit a take-over.
-        streams: Rates of requested messages, Hz.
-        needed: Parameters required to fly; `optional` ones may not exist.
-        fence: Parameters of the fence's radius and height, m; 0 disables it.
-        integers_by_bits: Integer parameters travel bytewise.
-    """
+    """A flight stack."""
 
     name: str
     autopilot: int
     offboard: FlightMode
     hold: FlightMode
     last_resort: FlightMode
-    steady: frozenset[int]
-    streams: Mapping[str, float]
-    needed: tuple[str, ...]
+    steady: frozenset[int]  # `custom_mode` of modes that permit a take-over
+    streams: Mapping[str, float]  # rates of requested messages, Hz
+    needed: tuple[str, ...]  # parameters required to fly; `optional` ones may not exist
     optional: tuple[str, ...]
     rules: tuple[ParameterRule, ...]
-    fence: tuple[str, str]
+    fence: tuple[str, str]  # parameters of the fence's radius and height, m; 0 disables it
     thrust: Callable[[Parameters, Vehicle], Thrust]
     response: Response
     take_off: TakeOffOrder
-    integers_by_bits: bool
+    integers_by_bits: bool  # integer parameters travel bytewise
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -26,37 +26,26 @@ _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
 
 
 class FailsafeInputs(NamedTuple):
-    """Inputs of the conditions; times are simulated, µs.
-
-    Attributes:
-        missed_us: Last frame before a gap.
-        listening_us: Start of listening for clients, by default the restart.
-        fence: Returns a place's distance inside every fence, m.
-        decided: Diagnostics while the control law is active.
-        late: Whether the declared solve time exceeds a control sample.
-        rotor_lost: Index of a failed rotor, if the vehicle must land.
-        needs_radio: Whether sticks are required in every mode.
-        exempt: Conditions that are reported only, with what continues; without effect if that is empty.
-    """
+    """Inputs of the conditions; times are simulated, µs."""
 
     now_us: int
-    missed_us: int | None
+    missed_us: int | None  # last frame before a gap
     state: VehicleState
     mode: Mode
     standing: bool
     estimate: Estimate | None
     setpoint: OffboardSetpoint | None
     sticks_us: int | None
-    listening_us: int
+    listening_us: int  # start of listening for clients, by default the restart
     station_us: int | None
     battery: BatteryState | None
-    fence: Callable[[Vector], float] | None
-    decided: Diagnostics | None
-    late: bool
-    rotor_lost: int | None
+    fence: Callable[[Vector], float] | None  # returns a place's distance inside every fence, m
+    decided: Diagnostics | None  # diagnostics while the control law is active
+    late: bool  # whether the declared solve time exceeds a control sample
+    rotor_lost: int | None  # index of a failed rotor, if the vehicle must land
     pace: Pace
-    needs_radio: bool = False
-    exempt: Mapping[Condition, str] = {}
+    needs_radio: bool = False  # whether sticks are required in every mode
+    exempt: Mapping[Condition, str] = {}  # reported only, with what continues; without effect if that is empty
 
 
 class Conditions:

@@ -19,25 +19,16 @@ _AUTO: int = STABILIZED | mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUI
 
 
 class ShownMode(NamedTuple):
-    """A flight mode of an identity.
+    """A flight mode of an identity."""
 
-    Attributes:
-        number: HEARTBEAT.custom_mode.
-        flies: Mode of the vehicle; None: the mode is refused by name.
-        covers: Modes of the vehicle shown as this one while it is selected.
-        guided: Whether the vehicle controls its position.
-        waits: Whether a standing vehicle waits for a start.
-        standard: MAV_STANDARD_MODE or 0.
-    """
-
-    number: int
+    number: int  # HEARTBEAT.custom_mode
     name: str
-    flies: Mode | None = None
-    covers: frozenset[Mode] = frozenset()
+    flies: Mode | None = None  # mode of the vehicle; None: the mode is refused by name
+    covers: frozenset[Mode] = frozenset()  # modes of the vehicle shown as this one while it is selected
     to_arm: bool = True
-    guided: bool = True
-    waits: bool = False
-    standard: int = 0
+    guided: bool = True  # whether the vehicle controls its position
+    waits: bool = False  # whether a standing vehicle waits for a start
+    standard: int = 0  # MAV_STANDARD_MODE or 0
     selectable: bool = True
 
 
@@ -50,30 +41,22 @@ class ModeBook:
     """The flight modes of an identity.
 
     Attributes:
-        chosen: Number for a mode of the vehicle, by command or unselected.
-        saved: Number shown for a failsafe's mode.
-        resumed: Number shown where a flight begins in the air.
         by_command: Returns the number, and its text, by DO_SET_MODE's parameters 1 to 3.
-        by_message: Returns the same by SET_MODE's base and custom mode.
-        unknown: Returns the refusal of a number by its text.
-        base_modes: Returns HEARTBEAT.base_mode; the number is of flights.
-        as_command: Returns DO_SET_MODE's parameters 1 to 3.
-        takeoff: Mode that NAV_TAKEOFF requires, with arming; None: neither is required.
     """
 
     modes: tuple[ShownMode, ...]
     first: int
-    chosen: Mapping[Mode, int]
-    saved: Mapping[Mode, int]
-    resumed: Mapping[Mode, int]
+    chosen: Mapping[Mode, int]  # number for a mode of the vehicle, by command or unselected
+    saved: Mapping[Mode, int]  # number shown for a failsafe's mode
+    resumed: Mapping[Mode, int]  # number shown where a flight begins in the air
     by_command: Callable[[float, float, float], tuple[int, str] | Refusal]
-    by_message: Callable[[int, int], tuple[int, str] | Refusal]
-    unknown: Callable[[str], Refusal]
+    by_message: Callable[[int, int], tuple[int, str] | Refusal]  # returns the same by SET_MODE's base and custom mode
+    unknown: Callable[[str], Refusal]  # returns the refusal of a number by its text
     refusal: Callable[[ShownMode, Refusal], Refusal]
     unarmable: Callable[[ShownMode], Refusal]
-    base_modes: Callable[[ShownMode, State, int], BaseModes]
-    as_command: Callable[[int], tuple[float, float, float]]
-    takeoff: int | None = None
+    base_modes: Callable[[ShownMode, State, int], BaseModes]  # returns HEARTBEAT.base_mode; the number is of flights
+    as_command: Callable[[int], tuple[float, float, float]]  # returns DO_SET_MODE's parameters 1 to 3
+    takeoff: int | None = None  # mode that NAV_TAKEOFF requires, with arming; None: neither is required
 
     @property
     def numbers(self) -> dict[int, ShownMode]:

@@ -24,25 +24,16 @@ class Ratio(IntEnum):
 
 
 class FusedInstrument(Protocol):
-    """A sensor fused without delay; one instance for each flight.
+    """A sensor fused without delay; one instance for each flight."""
 
-    Attributes:
-        part: Table in the vehicle file.
-        name: Measurement in tests and logs.
-        numbers: Values in a measurement.
-        bit: MAV_SYS_STATUS_SENSOR.
-        group: Flag of `Updated`; 0 with its own message.
-        smoothed: Whether corrections pass the output smoothing.
-    """
-
-    part: ClassVar[str]
-    name: ClassVar[str]
-    numbers: ClassVar[int]
+    part: ClassVar[str]  # table in the vehicle file
+    name: ClassVar[str]  # measurement in tests and logs
+    numbers: ClassVar[int]  # values in a measurement
     source: ClassVar[str]
-    bit: ClassVar[int]
+    bit: ClassVar[int]  # MAV_SYS_STATUS_SENSOR
     ratio: ClassVar[Ratio]
-    group: ClassVar[int] = 0
-    smoothed: ClassVar[bool] = False
+    group: ClassVar[int] = 0  # flag of `Updated`; 0 with its own message
+    smoothed: ClassVar[bool] = False  # whether corrections pass the output smoothing
     kind: MeasurementKind
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None: ...
