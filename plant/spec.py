@@ -39,8 +39,7 @@ class WorldSpec:
         ),
     ] = NO_WIND
     gusts: Annotated[
-        tuple[Gust, ...],
-        Option("a gust on top of the wind, of the shape 1 - cosine", GUST, read=gust, flag="gust"),
+        tuple[Gust, ...], Option("a gust on top of the wind, of the shape 1 - cosine", GUST, read=gust, flag="gust")
     ] = ()
     turbulence: Annotated[
         Intensity | None,
@@ -119,27 +118,23 @@ class PlantSpec(WorldSpec, ProcessSpec):
     link: Annotated[str | None, Option("where to wait for the autopilot", "URL")] = None
     vehicle: Annotated[str | Vehicle, Option("vehicle name or .toml", "NAME")] = "hummingbird"
     integrator: Annotated[
-        Literal["rk4", "adaptive"],
-        Option("rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9"),
+        Literal["rk4", "adaptive"], Option("rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9")
     ] = "rk4"
     home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
     rate: Annotated[float, Option("rate of frames, unless the autopilot requests another", "HZ", "Hz", above=0.0)] = (
         250.0
     )
     realtime: Annotated[
-        bool,
-        Option("run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command"),
+        bool, Option("run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command")
     ] = False
     cut_after: Annotated[
-        float,
-        Option("with --realtime: stop the rotors after this time without a command", "S", "s", above=0.0),
+        float, Option("with --realtime: stop the rotors after this time without a command", "S", "s", above=0.0)
     ] = 0.5
     duration: Annotated[
         float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
     ] = inf
     speed: Annotated[
-        float | None,
-        Option("times real time, or max (default: max; with --realtime 1)", "N", above=0.0, endless=True),
+        float | None, Option("times real time, or max (default: max; with --realtime 1)", "N", above=0.0, endless=True)
     ] = None
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog in --out, too")] = False
     truth: Annotated[bool, Option("append the true state to each frame, for a program in between (for tests)")] = False

@@ -24,15 +24,7 @@ from colibri.mavlink.services.statustext import ERROR, INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.blocks import Thinning
-from colibri.mavlink.ulog.flight_topics import (
-    COMMAND,
-    DECISION,
-    ESTIMATE,
-    FILTER,
-    MEASURED,
-    MORE_COMMAND,
-    split,
-)
+from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, ESTIMATE, FILTER, MEASURED, MORE_COMMAND, split
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
 from colibri.mavlink.ulog.log import FileLog, TopicLog, beginning
 from colibri.mavlink.ulog.reader import FILE

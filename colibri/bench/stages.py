@@ -29,11 +29,7 @@ from colibri.mavlink.links.open import open_link
 
 Figures: TypeAlias = dict[str, float]
 
-BLOCKS: Mapping[int, tuple[int, ...]] = {
-    12: (1, 2, 3, 6),
-    28: (1, 2, 3, 5, 7, 10),
-    60: (1, 2, 4, 8, 15, 30),
-}
+BLOCKS: Mapping[int, tuple[int, ...]] = {12: (1, 2, 3, 6), 28: (1, 2, 3, 5, 7, 10), 60: (1, 2, 4, 8, 15, 30)}
 """Steps of each correction, by horizon: short, as in `flight`, and as in `path`."""
 PROFILE_HORIZON = 28
 

@@ -29,10 +29,7 @@ _ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS = list(range(M1, M3 + 1))
 _COMMANDS = list(range(STATES, _SIZE))
 _SIGNS = (-1, 1)
-MIRRORS = (
-    (-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1),
-    (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1),
-)
+MIRRORS = ((-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1), (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1))
 """Signs of the states under exchange of left and right, and of fore and aft."""
 
 

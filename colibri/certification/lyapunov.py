@@ -250,9 +250,7 @@ def _attractor_program(problem: _Problem, ratio: float) -> tuple[Array, list[Ine
 
 
 def _first(
-    loop: UncertainLoop,
-    ratios: tuple[float, ...],
-    program: Callable[[_Problem, float], tuple[Array, list[Inequality]]],
+    loop: UncertainLoop, ratios: tuple[float, ...], program: Callable[[_Problem, float], tuple[Array, list[Inequality]]]
 ) -> Proof | None:
     """Solve for the first feasible ratio, then again with its set as a ball."""
 

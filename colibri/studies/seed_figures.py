@@ -19,10 +19,7 @@ _MAX_DECADES = 12
 _NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
 _TRUE = "rmse_after_20s_m"
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
-    (
-        "RMS (m)",
-        {"control_rmse_m": ("#000000", "reference from estimate"), _TRUE: ("#D55E00", "reference from truth")},
-    ),
+    ("RMS (m)", {"control_rmse_m": ("#000000", "reference from estimate"), _TRUE: ("#D55E00", "reference from truth")}),
     (
         "RMS (m)",
         {

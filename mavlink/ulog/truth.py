@@ -77,8 +77,4 @@ def _rotated(attitude: Array, vector: Array) -> tuple[Array, Array, Array]:
     w, x, y, z = attitude
     u, v, s = vector
     tx, ty, tz = 2.0 * (y * s - z * v), 2.0 * (z * u - x * s), 2.0 * (x * v - y * u)
-    return (
-        u + w * tx + y * tz - z * ty,
-        v + w * ty + z * tx - x * tz,
-        s + w * tz + x * ty - y * tx,
-    )
+    return (u + w * tx + y * tz - z * ty, v + w * ty + z * tx - x * tz, s + w * tz + x * ty - y * tx)

@@ -94,10 +94,7 @@ def _encode(world: World, physics: Physics) -> bytes:
     frame = state_frame(world)
     values = {
         "timestamp": world.time_us / _SECOND_US,
-        "imu": {
-            "gyro": frd_from_flu(frame.rate_flu_rad_s),
-            "accel_body": frd_from_flu(physics.specific_force(world)),
-        },
+        "imu": {"gyro": frd_from_flu(frame.rate_flu_rad_s), "accel_body": frd_from_flu(physics.specific_force(world))},
         "position": ned_from_enu(frame.position_enu_m),
         "quaternion": ned_frd_from_enu_flu(frame.attitude),
         "velocity": ned_from_enu(frame.velocity_enu_m_s),

@@ -63,12 +63,7 @@ class SweepPoint(NamedTuple):
     lemniscate: float | None
 
 
-WAYS = {
-    "not": "not compensated",
-    "measured": "measured",
-    "- 5": "set 5 ms too short",
-    "+ 5": "set 5 ms too long",
-}
+WAYS = {"not": "not compensated", "measured": "measured", "- 5": "set 5 ms too short", "+ 5": "set 5 ms too long"}
 """Compensated or not, and by what delay."""
 
 

@@ -214,8 +214,7 @@ def landing(order: Land) -> TaskSequence:
         return TaskSequence(lambda _: HoldTask(), lambda context: LandTask(context.place[:2], yaw_rad))
     x, y, _ = place
     return TaskSequence(
-        lambda context: GoToTask(GoTo((x, y, context.place[2]), yaw_rad), context),
-        lambda _: LandTask((x, y), yaw_rad),
+        lambda context: GoToTask(GoTo((x, y, context.place[2]), yaw_rad), context), lambda _: LandTask((x, y), yaw_rad)
     )
 
 

@@ -74,7 +74,7 @@ _TEXTS = {
     "profiles and vehicles": {
         "descriptions.show": """print the file of a profile or vehicle, to copy and change
             colibri show profile flight > mine.toml
-            colibri show vehicle hummingbird""",
+            colibri show vehicle hummingbird"""
     },
     "this computer": {
         "computer.compile": """compile what flights and flight tests need, beforehand

@@ -56,13 +56,7 @@ def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: R
 
 
 def _rate_command(
-    now: float,
-    then: float,
-    interval_s: float,
-    lag_s: float,
-    max_rate: float,
-    max_acceleration: float,
-    behind_s: float,
+    now: float, then: float, interval_s: float, lag_s: float, max_rate: float, max_acceleration: float, behind_s: float
 ) -> float:
     change = min(max(then - now, -max_acceleration * interval_s), max_acceleration * interval_s)
     reached = interval_s / lag_s if behind_s > 0.0 else 1.0 - exp(-interval_s / lag_s)
