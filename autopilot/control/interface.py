@@ -210,7 +210,8 @@ class Controller(Protocol[Memory]):
 class AttitudeController(Controller[Memory], Protocol[Memory]):
     """A control law that can also track an attitude, as some modes require.
 
-    A flight may switch between both steps at any sample.
+    A flight may switch between both steps at any sample. Attitudes tilt by up to 60°, or without limit if the law has
+    `tilts_freely = True`.
     """
 
     def step_attitude(

@@ -71,13 +71,9 @@ def slew_on(
         if kind == TILT:
             wanted[0], wanted[1] = vector[0], vector[1]
         elif kind == ATTITUDE:
-            _point(vector, there[2], slew.max_tilt_rad, wanted)
-            if free:
-                _turn(vector, there[2], over, here, wanted)
+            _aim(vector, there[2], free, over, slew.max_tilt_rad, here, wanted)
             after = wanted[:2].copy()
-            _point(vector, here[2], slew.max_tilt_rad, wanted)
-            if free:
-                _turn(vector, here[2], over, here, wanted)
+            _aim(vector, here[2], free, over, slew.max_tilt_rad, here, wanted)
             wanted_rate[:2] = (after - wanted[:2]) / interval_s
         w, max_rate, max_acceleration = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
         for i in range(2):
@@ -122,18 +118,26 @@ def _euler_rates(angles: Array, rate: Vector, out: Array) -> None:
 
 
 @compiled
-def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) -> None:
-    """Write roll and pitch that point body z along `direction`, ENU, within the tilt limit."""
+def _aim(
+    direction: Vector, psi: float, free: bool, over: bool, max_tilt_rad: float, here: Array, angles: Array
+) -> None:
+    """Write roll and pitch that point body z along `direction`, ENU: within the tilt limit, or `free` and near `here`.
+
+    If free, roll is beyond 90 degrees with `over`.
+    """
     x, y, z = direction[0], direction[1], direction[2]
     horizontal = sqrt(x * x + y * y)
-    if horizontal < _NO_DIRECTION:
+    if not free and horizontal < _NO_DIRECTION:
         x, y, z = 0.0, 0.0, 1.0
-    elif z < cos(max_tilt_rad) * sqrt(horizontal * horizontal + z * z):
+    elif not free and z < cos(max_tilt_rad) * sqrt(horizontal * horizontal + z * z):
         x, y, z = x / horizontal * sin(max_tilt_rad), y / horizontal * sin(max_tilt_rad), cos(max_tilt_rad)
     c, s = cos(psi), sin(psi)
     ahead = x * c + y * s
-    angles[0] = atan2(x * s - y * c, sqrt(ahead * ahead + z * z))
-    angles[1] = atan2(ahead, z)
+    phi, theta = atan2(x * s - y * c, sqrt(ahead * ahead + z * z)), atan2(ahead, z)
+    angles[0], angles[1] = phi, theta
+    if free:
+        angles[0] = _near(pi - phi if over else phi, here[0])
+        angles[1] = _near(pi + theta if over else theta, here[1])
 
 
 @compiled
@@ -142,23 +146,12 @@ def _near(angle: float, other: float) -> float:
 
 
 @compiled
-def _turn(direction: Vector, psi: float, over: bool, here: Array, angles: Array) -> None:
-    """Write roll and pitch near `here` that point body z along any `direction`; `over`: with roll beyond 90 degrees."""
-    x, y, z = direction[0], direction[1], direction[2]
-    c, s = cos(psi), sin(psi)
-    ahead = x * c + y * s
-    phi, theta = atan2(x * s - y * c, sqrt(ahead * ahead + z * z)), atan2(ahead, z)
-    angles[0] = _near(pi - phi if over else phi, here[0])
-    angles[1] = _near(pi + theta if over else theta, here[1])
-
-
-@compiled
 def _nearest_way(direction: Vector, yaw_rad: float, here: Array, angles: Array) -> tuple[bool, float]:
     """Choose how to reach an attitude, by roll or by pitch: whether roll is beyond 90 degrees, and yaw."""
     over, best, found = False, 1e9, yaw_rad
     for half in range(2):
         beyond, yaw = (direction[2] < 0.0) != (half == 1), yaw_rad + half * pi
-        _turn(direction, yaw, beyond, here, angles)
+        _aim(direction, yaw, True, beyond, pi, here, angles)
         way = abs(angles[0] - here[0]) + abs(angles[1] - here[1]) + abs(_near(yaw, here[2]) - here[2])
         if way < best:
             over, best, found = beyond, way, yaw

@@ -120,7 +120,7 @@ class Arena:
         return float(vehicle.body.mass_kg * np.linalg.norm(needed, axis=1).max() / vehicle.max_wrench()[0])
 
     def is_planned(self, row: Row) -> bool:
-        """Return whether each law plans the track itself."""
+        """Return whether each law plans the track itself, within its limits."""
         waypoints = self._track(row)[1].waypoints
         return waypoints is not None and waypoints.fastest
 

@@ -9,7 +9,7 @@ from time import monotonic
 from typing import Protocol, Self
 
 _LOOK_EVERY_S = 0.05
-_BUFFER_BYTES = 4_000_000
+_BUFFER_BYTES, _MOST_BYTES = 4_000_000, 4096
 
 
 def bound_socket() -> tuple[socket.socket, str]:
@@ -26,15 +26,17 @@ class Talker(Protocol):
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]: ...
 
 
-class OnPort:
-    """Connects a client, within a block, to a vehicle that serves `url`."""
+class ServedSockets(ABC):
+    """Sockets that a thread serves within a block."""
 
-    def __init__(self, talker: Talker) -> None:
-        self.sender: tuple[str, int] | None = None
-        self._talker = talker
-        self._socket, self.url = bound_socket()
+    def __init__(self, *sockets: socket.socket) -> None:
+        self._sockets = sockets
         self._ended = Event()
         self._thread = Thread(target=self._run, daemon=True)
+
+    @abstractmethod
+    def take(self, bound: socket.socket) -> None:
+        """Read a datagram from a socket that has one."""
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -43,25 +45,39 @@ class OnPort:
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
-        self._socket.close()
+        for bound in self._sockets:
+            bound.close()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            for bound in select(self._sockets, [], [], _LOOK_EVERY_S)[0]:
+                self.take(bound)
+
+
+class OnPort(ServedSockets):
+    """Connects a client, within a block, to a vehicle that serves `url`."""
+
+    def __init__(self, talker: Talker) -> None:
+        self.sender: tuple[str, int] | None = None
+        self._talker = talker
+        self._socket, self.url = bound_socket()
+        super().__init__(self._socket)
 
     def send(self, datagram: bytes) -> None:
         assert self.sender is not None, "nothing has been received"
         self._socket.sendto(datagram, self.sender)
 
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            if select([self._socket], [], [], _LOOK_EVERY_S)[0]:
-                datagram, self.sender = self._socket.recvfrom(4096)
-                for answer in self._talker.receive(datagram, monotonic()):
-                    self.send(answer)
+    def take(self, bound: socket.socket) -> None:
+        datagram, self.sender = bound.recvfrom(_MOST_BYTES)
+        for answer in self._talker.receive(datagram, monotonic()):
+            self.send(answer)
 
 
 LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
 """Parts of the datagrams on a `BadLink`."""
 
 
-class Relay(ABC):
+class Relay(ServedSockets):
     """Stands between a plant and an autopilot, which calls `url`."""
 
     def __init__(self, plant_url: str) -> None:
@@ -70,8 +86,7 @@ class Relay(ABC):
         self._near, self.url = bound_socket()
         self._far, _ = bound_socket()
         self._autopilot: tuple[str, int] | None = None
-        self._ended = Event()
-        self._thread = Thread(target=self._run, daemon=True)
+        super().__init__(self._near, self._far)
 
     @abstractmethod
     def pass_on(self, to: str, datagram: bytes) -> None:
@@ -83,25 +98,11 @@ class Relay(ABC):
         elif self._autopilot:
             self._near.sendto(datagram, self._autopilot)
 
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._thread.join()
-        self._near.close()
-        self._far.close()
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            for sock in select([self._near, self._far], [], [], 0.05)[0]:
-                datagram, sender = sock.recvfrom(4096)
-                if sock is self._near:
-                    self._autopilot = sender
-                    self.pass_on("plant", datagram)
-                else:
-                    self.pass_on("autopilot", datagram)
+    def take(self, bound: socket.socket) -> None:
+        datagram, sender = bound.recvfrom(_MOST_BYTES)
+        if bound is self._near:
+            self._autopilot = sender
+        self.pass_on("plant" if bound is self._near else "autopilot", datagram)
 
 
 class BadLink(Relay):

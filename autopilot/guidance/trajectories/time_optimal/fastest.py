@@ -68,13 +68,14 @@ def _optimised(
         dips = list(dips_of(track, floor_m))
         if dips and lifts == _LIFTS:
             raise waypoints.error(f"it cannot be held above the floor of {floor_m:g} m: add a waypoint")
-        beyond = np.array([worst for worst, _ in _beyond(waypoints, reach, track)])
         if dips:
             cost.floor_m += 2.0 * (floor_m - min(height_m for _, height_m in dips))
             weights, lifts = [cost.weight], lifts + 1
-        elif last and beyond.max() > 0.0 and tightenings < _TIGHTENINGS:
-            cost.tightened = cost.tightened + np.maximum(beyond, 0.0)
-            weights, tightenings = [cost.weight], tightenings + 1
+        elif last and tightenings < _TIGHTENINGS:
+            beyond = np.array([worst for worst, _ in _beyond(waypoints, reach, track)])
+            if beyond.max() > 0.0:
+                cost.tightened = cost.tightened + np.maximum(beyond, 0.0)
+                weights, tightenings = [cost.weight], tightenings + 1
     return legs_s, points
 
 
