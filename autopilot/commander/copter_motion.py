@@ -56,11 +56,11 @@ class CopterMotion(MotionCommands):
         if self.guided and self._pilot.state.armed:
             self._take(setpoint or STOP)
 
-    def _take(self, setpoint: OffboardSetpoint, *, keeps_turn: bool = False) -> Refusal | None:
+    def _take(self, setpoint: OffboardSetpoint) -> Refusal | None:
         task = self.task
         refusal = None if task is not None else self._fly(Mode.HOLD, task := self._new_task())
         if refusal is None and task is not None:
-            task.take(setpoint, self._pilot.context(), keeps_turn=keeps_turn)
+            task.take(setpoint, self._pilot.context())
         return refusal
 
     @property
@@ -118,7 +118,7 @@ class CopterMotion(MotionCommands):
             return Refusal(f"reposition: {refusal.reason}", DENIED)
         if not self._pilot.state.armed:
             return None  # accepted and forgotten, as in ArduCopter
-        return self._take(PositionSetpoint(place), keeps_turn=True)  # type: ignore[arg-type]
+        return self._take(PositionSetpoint(place))  # type: ignore[arg-type]
 
     def _turn(self, command: ReceivedCommand) -> Refusal | None:
         angle, rate, way, relative = (0.0 if isnan(value) else value for value in command[1:5])

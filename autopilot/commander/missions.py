@@ -125,8 +125,9 @@ class Missions:
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
         """Continue a mission, with the current item's turns and remaining legs."""
         behaviour = self._behaviour
+        acceptance_m = max(behaviour.acceptance_m, 0.1)
         self._executor.defaults = Defaults(
-            max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
+            acceptance_m, behaviour.takeoff_height_m, behaviour.orbit_radius_m, behaviour.items_face
         )
         return MissionTask(self._executor, self, turns, legs)
 

@@ -16,6 +16,7 @@ class Behaviour:
 
     An identity sets those from `return_delay_s` on: a return waits above home for `return_delay_s`, ends
     `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`.
+    By `items_face`, items of missions face their way or keep the heading; if None, each has its yaw.
     Landings are slow below `land_slow_below_m`.
     """
 
@@ -52,6 +53,7 @@ class Behaviour:
     return_speed_m_s: float = 0.0
     return_climb_m: float = 0.0
     return_faces: bool = True
+    items_face: bool | None = None
     land_high_m_s: float = 0.0
     land_slow_below_m: float = 0.0
     stick_climb_m_s: float = 0.0

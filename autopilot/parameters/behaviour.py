@@ -26,6 +26,7 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
     "return_speed_m_s": lambda p: 0.01 * p["RTL_SPEED"],
     "return_climb_m": lambda p: 0.01 * p["RTL_CLIMB_MIN"],
     "return_faces": lambda p: p["WP_YAW_BEHAVIOR"] in _FACES_HOME,
+    "items_face": lambda p: p["WP_YAW_BEHAVIOR"] != 0,
     "land_high_m_s": lambda p: 0.01 * p["LAND_SPEED_HIGH"],
     "land_slow_below_m": lambda p: 0.01 * p["LAND_ALT_LOW"],
     "stick_climb_m_s": lambda p: 0.01 * p["PILOT_SPEED_UP"],

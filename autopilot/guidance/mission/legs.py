@@ -30,11 +30,12 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Numbers for items that leave them out."""
+    """Numbers for items that leave them out; `face` is as `Behaviour.items_face`."""
 
     acceptance_m: float = 0.5
     takeoff_height_m: float = 2.5
     orbit_radius_m: float = 10.0
+    face: bool | None = None
 
 
 class ItemContext(NamedTuple):
@@ -47,6 +48,15 @@ class ItemContext(NamedTuple):
 
     def place(self, item: MissionItem) -> Vector:
         return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
+
+    def yaw(self, item: MissionItem) -> float | None:
+        """Return the heading of an item, rad; None is along its way."""
+        if self.defaults.face is None and isfinite(item.p4):
+            return remainder(0.5 * pi - radians(item.p4), tau)
+        if self.defaults.face is not False:
+            return None
+        kept = self.order.yaw_rad if isinstance(self.order, GoTo) else None
+        return self.mission_context.yaw_rad if kept is None else kept
 
 
 EndCondition: TypeAlias = Callable[[MissionContext, float], bool]
@@ -76,7 +86,7 @@ def _there(
     item: MissionItem, context: ItemContext, stay_s: float, radius_m: float | None = None
 ) -> tuple[LegPhase, ...]:
     place, radius_m = context.place(item), context.defaults.acceptance_m if radius_m is None else radius_m
-    go = GoTo(place, _yaw(item.p4), context.speed_m_s)
+    go = GoTo(place, context.yaw(item), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
     stay = (LegPhase(None, _after(stay_s)),) if stay_s > 0.0 else ()
     return (*climb, LegPhase(go, _within(place, radius_m), reaches=True), *stay)
@@ -95,7 +105,7 @@ def _circle(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 def _take_off(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     mission_context, defaults = context.mission_context, context.defaults
     height = height_of(item, mission_context.home_enu_m, mission_context.origin)
-    yaw = _yaw(item.p4)
+    yaw = context.yaw(item)
     high = mission_context.position_enu_m[2] >= height - defaults.acceptance_m and not mission_context.landed
     up = () if high else (LegPhase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
     if is_here(item):
@@ -107,7 +117,7 @@ def _take_off(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 def _land(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     place = None if is_here(item) else context.place(item)
-    return (LegPhase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
+    return (LegPhase(Land(place, context.yaw(item)), _landed, reaches=True),)
 
 
 def _delay(item: MissionItem, _context: ItemContext) -> tuple[LegPhase, ...]:
@@ -154,12 +164,6 @@ def _off_the_ground(height_m: float, context: ItemContext) -> tuple[LegPhase, ..
         return ()
     up = max(height_m, mission_context.position_enu_m[2] + defaults.takeoff_height_m)
     return (LegPhase(TakeOff(up), _above(up - defaults.acceptance_m)),)
-
-
-def _yaw(clockwise_from_north_deg: float) -> float | None:
-    if not isfinite(clockwise_from_north_deg):
-        return None
-    return remainder(0.5 * pi - radians(clockwise_from_north_deg), tau)
 
 
 def _or_zero(value: float) -> float:

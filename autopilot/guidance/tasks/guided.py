@@ -1,7 +1,7 @@
 """The task of ArduPilot's GUIDED: one setpoint is enough; velocities, accelerations and attitudes lapse.
 
 Sources: ArduCopter's mode_guided.cpp and autoyaw.cpp, and "Copter Commands in Guided Mode" of its wiki. A setpoint's
-yaw stays until the next one; without yaw the vehicle looks along its way, unless a turn was commanded.
+yaw stays until the next one; without yaw the vehicle looks along its way.
 """
 
 from collections.abc import Callable
@@ -67,16 +67,15 @@ class GuidedTask(EndlessTask):
             return Hold()
         return GoTo(setpoint.position_enu_m, None if isnan(setpoint.yaw_rad) else setpoint.yaw_rad)
 
-    def take(self, setpoint: OffboardSetpoint, context: TaskContext, *, keeps_turn: bool = False) -> None:
+    def take(self, setpoint: OffboardSetpoint, context: TaskContext) -> None:
         """Fly a setpoint; velocities along the heading stay as they are on earth."""
         self.paused = False
         if isinstance(setpoint, PositionSetpoint):
             setpoint = setpoint.in_enu(context.state.euler[2])._replace(time_us=context.now_us)
             if not isnan(setpoint.yaw_rad) or not isnan(setpoint.yaw_rate_rad_s):
                 self._turn = None
-            elif not keeps_turn and self._settings().looks_ahead and self._turn is None:
-                yaw_rad = _along(setpoint, context)
-                setpoint = setpoint if yaw_rad is None else setpoint._replace(yaw_rad=yaw_rad)
+            elif self._settings().looks_ahead and (yaw_rad := _along(setpoint, context)) is not None:
+                self._turn, setpoint = None, setpoint._replace(yaw_rad=yaw_rad)
             self._forget()
         elif not isinstance(self._setpoint, AttitudeSetpoint):
             self._forget()
@@ -154,6 +153,7 @@ class GuidedTask(EndlessTask):
 
 
 def _along(setpoint: PositionSetpoint, context: TaskContext) -> float | None:
+    """Return the heading of a setpoint's way, rad; None if it is too slow or none is given."""
     (x, y, _), (vx, vy, _) = setpoint.position_enu_m, setpoint.velocity_m_s
     if not isnan(x):
         east, north = x - context.place[0], y - context.place[1]
