@@ -68,5 +68,5 @@ class Conventions:
     kept_plans: Callable[[Parameters], Collection[int]] = lambda _: ()
     rewrite: Rewrite = str
     banner: tuple[str, ...] = ()  # status texts at the start, after Colibri's own
-    describe: Callable[[int, MissionItem], str] | None = None  # returns the text of a mission item that begins
+    describe: Callable[[int, MissionItem, bool], str] | None = None  # text of a mission item that begins or is reached
     services: Callable[[Served], Sequence[Service]] = lambda _: ()

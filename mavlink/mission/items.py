@@ -1,12 +1,12 @@
 """Items of missions, unchanged between upload and download: https://mavlink.io/en/services/mission.html."""
 
 from collections.abc import Sequence
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from struct import Struct
 from typing import Any, NamedTuple
 from zlib import crc32
 
-from colibri.mavlink.node.service import Fields, Peer
+from colibri.mavlink.node.service import Fields, Peer, Send
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, NOT_GIVEN, command_name
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import misplaced, misplaced_height
@@ -20,7 +20,7 @@ _NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally", ALL: "all plans"}
 
 ACCEPTED: int = mav.MAV_MISSION_ACCEPTED
 
-_FIRST_PARAMETER, _PARAMETERS = 3, 7
+_FIRST_PARAMETER, _PARAMETERS, _FRAME = 3, 7, 3  # the last counts in a message
 _PACKED = Struct("<BHBffffiif")
 _INT32 = range(-(2**31), 2**31)
 
@@ -93,6 +93,14 @@ def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_typ
     frame, command, autocontinue, p1, p2, p3, p4, x, y, z = item
     target = (peer.system, peer.component)
     return (*target, seq, frame, command, int(current), autocontinue, p1, p2, p3, p4, x, y, z, plan_type)
+
+
+def in_old_form(send: Send) -> Send:
+    """Return a MISSION_ITEM_INT as MISSION_ITEM: degrees in global frames."""
+    *head, x, y, z, plan_type = send.fields
+    scale = DEGREES if send.fields[_FRAME] in GLOBAL_FRAMES else 1.0
+    x, y = (nan if value == NOT_GIVEN else value * scale for value in (x, y))
+    return send._replace(name="MISSION_ITEM", fields=(*head, x, y, z, plan_type))
 
 
 def _whole(value: float, scale: float) -> int | None:

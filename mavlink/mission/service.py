@@ -1,7 +1,7 @@
 """The mission microservice of mission, geofence and rally points: https://mavlink.io/en/services/mission.html."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.geodesy import MAX_LATITUDE_DEG
@@ -14,6 +14,7 @@ from colibri.mavlink.mission.items import (
     MissionItem,
     StoredPlan,
     behind,
+    in_old_form,
     item_fields,
     plan_name,
     plan_of,
@@ -29,6 +30,7 @@ from colibri.mavlink.wire.refusal import Refusal
 STREAM_EVERY_US = 1_000_000
 NO_MISSION_TOTAL = 0xFFFF  # MISSION_CURRENT.total without a mission
 GUIDED = 2  # MISSION_ITEM.current of an immediate destination, as DroneKit's simple_goto sends
+CHANGE_HEIGHT = 3  # the same of a height, as MAVProxy's changealt sends
 FORGOTTEN_AFTER_US = 5_000_000  # silence after which a reader gets the newest plan
 MAX_READERS = 32
 _OF_A_PLAN = frozenset({"MISSION_COUNT", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_REQUEST"})
@@ -88,7 +90,7 @@ class MissionVehicle(NamedTuple):
     set_current: Callable[[int, bool], Refusal | None]  # (seq or -1 for the current, reset the counters)
     guided_goto: Callable[[float, float, float, int], Refusal | None]  # (degrees, degrees, m, MAV_FRAME)
     home: Callable[[], MissionItem] | None = None  # of a vehicle whose item 0 is home
-    describe: Callable[[int, MissionItem], str] | None = None  # text of an item that begins
+    describe: Callable[[int, MissionItem, bool], str] | None = None  # text of an item that begins or is reached
 
 
 class MissionService:
@@ -103,7 +105,7 @@ class MissionService:
         streams: bool = True,
         old_form: bool | None = None,
     ) -> None:
-        """Serve a vehicle; `streams` sends MISSION_CURRENT unasked, `old_form` asks for items by MISSION_REQUEST."""
+        """Serve a vehicle; `streams` sends MISSION_CURRENT unasked, `old_form` uses MISSION_REQUEST, MISSION_ITEM."""
         self.plans: dict[int, StoredPlan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
         self._vehicle = vehicle
         self._progress = vehicle.progress
@@ -118,7 +120,7 @@ class MissionService:
             "MISSION_COUNT": self._count,
             "MISSION_REQUEST_LIST": self._request_list,
             "MISSION_REQUEST_INT": self._request,
-            "MISSION_REQUEST": self._request,
+            "MISSION_REQUEST": self._request_old if old_form else self._request,
             "MISSION_ACK": self._ack,
             "MISSION_CLEAR_ALL": self._clear_all,
             "MISSION_SET_CURRENT": self._set_current,
@@ -157,12 +159,13 @@ class MissionService:
         again = shown is not None and (shown.seq == progress.seq and shown.state != mav.MISSION_STATE_NOT_STARTED)
         if describe is None or not begun or again:
             return []
-        return self._text.say(INFO, describe(progress.seq + self._offset, items[progress.seq]))
+        return self._text.say(INFO, describe(progress.seq + self._offset, items[progress.seq], False))
 
     def reached(self, seq: int) -> None:
         self._outbox.append(to_all("MISSION_ITEM_REACHED", seq + self._offset))
-        if self._vehicle.describe is not None:
-            self._outbox += self._text.say(INFO, f"Reached command #{seq + self._offset}")
+        items, describe = self.plans[MISSION].items, self._vehicle.describe
+        text = describe(seq + self._offset, items[seq], True) if describe and seq < len(items) else ""
+        self._outbox += self._text.say(INFO, text) if text else ()
 
     def _seq(self) -> int:
         """Return the current item as clients count; 0 until a mission with home has begun."""
@@ -227,13 +230,17 @@ class MissionService:
         fields = message.fields
         scale = DEGREES if message.name == "MISSION_ITEM_INT" else 1.0
         latitude, longitude = fields.x * scale, fields.y * scale
-        known = (fields.current, fields.command, fields.mission_type) == (GUIDED, mav.MAV_CMD_NAV_WAYPOINT, MISSION)
+        climbs = fields.current == CHANGE_HEIGHT and self._vehicle.home is not None
+        known = (fields.command, fields.mission_type) == (mav.MAV_CMD_NAV_WAYPOINT, MISSION)
+        known &= climbs or fields.current == GUIDED
         what = f"item to fly to now (current {fields.current}): {command_name(fields.command)}"
         if not known:
             return mav.MAV_MISSION_UNSUPPORTED, f"{what} is not supported"
         if fields.frame not in GLOBAL_FRAMES:
             return mav.MAV_MISSION_UNSUPPORTED_FRAME, f"{what} in frame {fields.frame}"
-        place = misplaced(latitude, longitude)
+        if climbs:
+            latitude = longitude = nan
+        place = "" if climbs else misplaced(latitude, longitude)
         if place:
             at_x = not abs(latitude) <= MAX_LATITUDE_DEG
             return mav.MAV_MISSION_INVALID_PARAM5_X if at_x else mav.MAV_MISSION_INVALID_PARAM6_Y, f"{what}: {place}"
@@ -269,6 +276,10 @@ class MissionService:
             why = f"there is no item {fields.seq}"
             return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, plan_type, why)
         return [found]
+
+    def _request_old(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        sends = self._request(fields, peer, now_us)
+        return [in_old_form(send) if send.name == "MISSION_ITEM_INT" else send for send in sends]
 
     def _ack(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         self._downloads.end(peer, fields.mission_type)
