@@ -27,6 +27,7 @@ from colibri.autopilot.guidance.tasks.task import (
     PlannedMotion,
     PositionMotion,
     TaskContext,
+    TaskOutput,
     lifts,
 )
 from colibri.common.types import Vector
@@ -111,6 +112,7 @@ class Pilot:
         self.sensed = Sensed()
         self.lag_us = 0
         self.task: FlightTask = HoldTask()
+        self.wanted: TaskOutput | None = None
         self._task_is_chosen = False
         self.speed_m_s: float | None = None
         self.saving = Action.NONE
@@ -280,7 +282,7 @@ class Pilot:
         if not self.state.armed:
             return self._rest()
         context = self.context()
-        wanted = self.task.update(context)
+        wanted = self.wanted = self.task.update(context)
         if isinstance(self.task, MissionTask) and self.task.returns:
             self.happened(Event.RETURN_ITEM)
         if self.ground.standing:

@@ -21,7 +21,9 @@ from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.guidance.guidance import Guidance
+from colibri.autopilot.guidance.reference import ALL_BOUND
 from colibri.autopilot.guidance.tasks.guided import GuidedTask
+from colibri.autopilot.guidance.tasks.task import PositionMotion
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.setpoints.setpoints import PositionSetpoint
@@ -113,6 +115,7 @@ class SnapshotBuilder:
             delay_us=pilot.sensed.delay_us,
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
             channels=pilot.sensed.steered.channels,
+            target_enu_m=destination(pilot) if modes.book.destination else NOWHERE,
             requested=requested(pilot.task.setpoint) if isinstance(pilot.task, GuidedTask) else None,
             flight_started_us=times.armed_us,
             takeoff_us=times.takeoff_us,
@@ -145,6 +148,15 @@ class SnapshotBuilder:
             *(squared, forecast, how.mass_kg, how.path_lag_s),
         )
         return self._solver
+
+
+def destination(pilot: Pilot) -> Vector:
+    """Return the place that is flown to; nan without one."""
+    wanted = pilot.wanted if pilot.state.armed else None
+    if not isinstance(wanted, PositionMotion) or wanted.target.kinds != ALL_BOUND:
+        return NOWHERE
+    x, y, z = wanted.target.motion[-1, 0].tolist()
+    return (x, y, z)
 
 
 def requested(setpoint: PositionSetpoint | None) -> Setpoint | None:

@@ -3,8 +3,8 @@
 Sources: ArduCopter's mode.h, GCS_Copter.cpp and GCS_MAVLink_Copter.cpp, 4.6.
 """
 
-from collections.abc import Collection
-from re import sub
+from collections.abc import Callable, Collection
+from re import Match, sub
 
 from colibri.autopilot.commander.copter_commands import CopterCommands
 from colibri.autopilot.commander.rules.modes import Mode, Need, State
@@ -109,6 +109,7 @@ MODES = ModeBook(
     unarmable=lambda mode: Refusal(f"Arm: {mode.name} mode not armable", FAILED),
     base_modes=_base_modes,
     as_command=lambda number: (float(CUSTOM), float(number), 0.0),
+    destination=True,
     takeoff=GUIDED,
 )
 
@@ -146,17 +147,23 @@ STREAMS = Streams(
     unstreamed=(DENIED, DENIED),
 )
 
-_TEXTS = (
+_TEXTS: tuple[tuple[str, str | Callable[[Match[str]], str]], ...] = (
     (r"^Arming denied( in \w+)?: (.*?);.*", r"Arm: \2"),
     (r"^Arming denied( in \w+)?: ", "Arm: "),
     (r"^Armed$", "Arming motors"),
     (r"^Disarmed.*", "Disarming motors"),
     (r"^mission of \d+ items$", "Flight plan received"),
+    (r"^(mission|geofence|rally points) cleared$|^geofence loaded$|^\d+ rally points$", ""),
+    (r"^item (\d+) of the mission", lambda found: f"item {int(found[1]) + 1} of the mission"),
     (r"^Mission RTL item: .*", ""),
     (r"^Takeoff (altitude reached: |detected).*", ""),
     (r"^Landing detected$", ""),
     (r"^(Arm|PreArm): outside the geofence", r"\1: Vehicle breaching Polygon fence"),
     (r"^(Arm|PreArm): more than [\d.]+ m (from|above) home", r"\1: Vehicle breaching fence"),
+    (r"^Failsafe cleared: (battery|setpoints).*", ""),
+    (r"^Failsafe cleared: geofence.*", "Fence breach cleared"),
+    (r"^Failsafe cleared: (position lost|estimate invalid)", "EKF Failsafe Cleared"),
+    (r"^Failsafe cleared: GPS lost", "Glitch cleared"),
     (r"^Failsafe cleared: ground station lost", "GCS Failsafe Cleared"),
     (r"^Failsafe cleared: sticks lost", "Radio Failsafe Cleared"),
     (r"^Warning: ground station lost, continuing ", "GCS Failsafe - Continuing "),
@@ -165,6 +172,8 @@ _TEXTS = (
     (r"^(Failsafe activated|Failsafe): sticks lost.*", "Radio Failsafe"),
     (r"^(Failsafe activated|Failsafe|Warning): battery (low|critical).*", r"Battery 1 is \2"),
     (r"^(Failsafe activated|Failsafe|Warning): geofence breached.*", "Fence Breached"),
+    (r"^Failsafe activated: (position lost|estimate invalid).*", "EKF Failsafe: changed to LAND Mode"),
+    (r"^(Failsafe activated|Failsafe|Warning): GPS lost.*", "GPS Glitch or Compass error"),
 )
 """Status texts of Colibri, and ArduCopter's; empty where it sends none."""
 
@@ -192,7 +201,12 @@ _ITEMS = {
 }
 
 
-def _describe(seq: int, item: MissionItem) -> str:
+_REPORTED = (mav.MAV_CMD_NAV_WAYPOINT, mav.MAV_CMD_NAV_SPLINE_WAYPOINT, mav.MAV_CMD_NAV_LOITER_TIME)
+
+
+def _describe(seq: int, item: MissionItem, reached: bool) -> str:
+    if reached:
+        return f"Reached command #{seq}" if item.command in _REPORTED else ""
     return f"Mission: {seq} {_ITEMS.get(item.command, command_name(item.command))}"
 
 

@@ -1,15 +1,22 @@
 """Services of ArduCopter: texts, version, stream rates, radio switches, simulation."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from math import radians
 
 from colibri.autopilot.ground.conventions import Served
+from colibri.common.earth.geodesy import Geodetic
 from colibri.common.kernels import cos
+from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG, Fault
 from colibri.mavlink.hil.world_changes import PaceChange, WindChange, WorldChange
 from colibri.mavlink.node.service import Peer, Send, Service, to
 from colibri.mavlink.parameters.store import Parameters
+from colibri.mavlink.services.command import ReceivedCommand
 from colibri.mavlink.services.statustext import CRITICAL, INFO, WARNING
+from colibri.mavlink.telemetry.encoder import Encoder, fitted
+from colibri.mavlink.telemetry.position import gps_global_origin, home_position
+from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
@@ -25,6 +32,7 @@ _MODE_OPTIONS = {4: 6, 16: 3, 18: 9, 33: 17, 52: 1, 55: 4, 56: 5, 57: 23, 68: 0,
 """Mode number by RCn_OPTION."""
 _FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
 _M_PER_DEG = 111_319.5
+_PLACES: Mapping[str, Encoder] = {"HOME_POSITION": home_position, "GPS_GLOBAL_ORIGIN": gps_global_origin}
 _STREAMS = {
     "RAW_SENS": mav.MAV_DATA_STREAM_RAW_SENSORS,
     "EXT_STAT": mav.MAV_DATA_STREAM_EXTENDED_STATUS,
@@ -75,6 +83,52 @@ class Greeter:
 
 def _text(text: str, channel: int) -> Send:
     return Send("STATUSTEXT", (INFO, text.encode(), 0, 0), channel)
+
+
+class Polled:
+    """A service that receives no messages."""
+
+    handles = frozenset[str]()
+
+    def __init__(self, served: Served) -> None:
+        self._served = served
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        del message, peer, now_us
+        return ()
+
+
+class Places(Polled):
+    """Reports home and origin at arming, when they change, and on request without a frame's delay."""
+
+    def __init__(self, served: Served) -> None:
+        super().__init__(served)
+        self._encoders = {name: fitted(name, encoder) for name, encoder in _PLACES.items()}
+        self._shown = self._place()
+        for name in _PLACES:
+            served.streams.provide(name, partial(self._answer, name))
+
+    def _answer(self, name: str, command: ReceivedCommand) -> list[Send]:
+        return [send._replace(channel=command.peer.channel) for send in self._sends(name)]
+
+    def _sends(self, *names: str) -> list[Send]:
+        snapshot, home = self._served.snapshot, self._served.pilot.home
+        if snapshot is None:
+            return []
+        snapshot = snapshot._replace(origin=home.origin, home=HomePosition(home.position_enu_m, home.yaw_rad))
+        return [Send(name, fields) for name in names if isinstance(fields := self._encoders[name](snapshot), tuple)]
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        del now_us
+        place = self._place()
+        if place == self._shown:
+            return ()
+        self._shown = place
+        return self._sends(*_PLACES)
+
+    def _place(self) -> tuple[Vector, Geodetic, int]:
+        pilot = self._served.pilot
+        return (pilot.home.position_enu_m, pilot.home.origin, pilot.ground.times.flights)
 
 
 class VersionRequests:
@@ -130,19 +184,6 @@ class StreamRates:
                     self._rates[name] = rate
                     for channel in served.streams.channels:
                         served.streams.set_group(channel, number, rate, now_us)
-        return ()
-
-
-class Polled:
-    """A service that receives no messages."""
-
-    handles = frozenset[str]()
-
-    def __init__(self, served: Served) -> None:
-        self._served = served
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, peer, now_us
         return ()
 
 
@@ -298,5 +339,5 @@ _WORLD_AT_REST: dict[str, Fault | WorldChange] = {
 
 
 def copter_services(served: Served) -> Sequence[Service]:
-    kinds = (Greeter, VersionRequests, StreamRates, PreArm, Switches, SimulatedWorld)
+    kinds = (Greeter, Places, VersionRequests, StreamRates, PreArm, Switches, SimulatedWorld)
     return [kind(served) for kind in kinds]

@@ -1,7 +1,8 @@
 """Messages that ArduPilot sends beside the common ones, as GCS_Common.cpp and ardupilotmega.xml have them."""
 
-from math import degrees, hypot, isfinite
+from math import degrees, hypot, isfinite, isnan
 
+from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry import controller, sensors, status
@@ -15,6 +16,7 @@ _STABILIZE, _ALT_HOLD = 0, 2
 _SERVO_MV, _BOARD_MV = 0, 5000
 _NO_RSSI = 255
 _CHANNELS = 18
+_PLACE_ONLY = 0xFDF8
 _ATTITUDE, _PLACE = 1, 8 | 16 | 256 | 512
 _CONSTANT_POSITION, _UNINITIALISED = 128, 1024
 _ESTIMATOR = {1: _ATTITUDE, 2: 2, 4: 4, 8: 8 | 256, 16: 16 | 512, 32: 32}
@@ -85,9 +87,12 @@ def position_target_local_ned(s: TelemetrySnapshot) -> Fields | None:
     return None if s.requested is None else controller.position_target_local_ned(s._replace(setpoint=s.requested))
 
 
-def position_target_global_int(s: TelemetrySnapshot) -> Fields:
-    """POSITION_TARGET_GLOBAL_INT (87): the client's setpoint in GUIDED, or the law's."""
-    return controller.position_target_global_int(s if s.requested is None else s._replace(setpoint=s.requested))
+def position_target_global_int(s: TelemetrySnapshot) -> Fields | None:
+    """POSITION_TARGET_GLOBAL_INT (87): where the vehicle goes, degE7, m above the sea."""
+    if any(map(isnan, s.target_enu_m)):
+        return None
+    place = geodetic_of(s.target_enu_m, s.origin)
+    return (s.boot_ms, mav.MAV_FRAME_GLOBAL, _PLACE_ONLY, *degrees_e7(place), place.altitude_m, *(0.0,) * 8)
 
 
 _ENCODERS: dict[str, Encoder] = {

@@ -56,6 +56,7 @@ class ModeBook:
     unarmable: Callable[[ShownMode], Refusal]
     base_modes: Callable[[ShownMode, State, int], BaseModes]  # returns HEARTBEAT.base_mode; the number is of flights
     as_command: Callable[[int], tuple[float, float, float]]  # returns DO_SET_MODE's parameters 1 to 3
+    destination: bool = False  # whether NAV_CONTROLLER_OUTPUT has the distance to where the vehicle goes
     takeoff: int | None = None  # mode that NAV_TAKEOFF requires, with arming; None: neither is required
 
     @property

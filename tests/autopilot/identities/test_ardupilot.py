@@ -14,6 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
+from tests.autopilot.identities.copter_words import heading, near_angle
 
 ARDUPILOT = conventions_of("ardupilot")
 AS_ARDUPILOT = pytest.mark.sitl(identity="ardupilot")
@@ -76,6 +77,11 @@ def test_reset_returns_to_arducopters_defaults() -> None:
         ("Failsafe activated: ground station lost, return", "GCS Failsafe"),
         ("Failsafe cleared: sticks lost", "Radio Failsafe Cleared"),
         ("Warning: battery low", "Battery 1 is low"),
+        ("Failsafe cleared: battery critical", ""),
+        ("Failsafe cleared: geofence breached", "Fence breach cleared"),
+        ("Failsafe cleared: position lost", "EKF Failsafe Cleared"),
+        ("geofence loaded", ""),
+        ("item 0 of the mission: 9.0 m below the ground", "item 1 of the mission: 9.0 m below the ground"),
     ],
 )
 def test_texts_have_arducopters_words(ours: str, theirs: str) -> None:
@@ -147,6 +153,43 @@ def test_item_0_is_home_and_a_part_is_replaced(sitl: Sitl) -> None:
     assert sitl.gcs.latest("MISSION_COUNT").count == 5
     home, _, way, jump, _ = sitl.gcs.heard["MISSION_ITEM_INT"][-5:]
     assert (home.frame, home.command, way.z, jump.param1) == (GLOBAL, mav.MAV_CMD_NAV_WAYPOINT, 7.0, 2.0)
+    for seq in (0, 2):
+        sitl.send("MISSION_REQUEST", 1, 1, seq, MISSION)
+    sitl.run(0.2)
+    home, way = sitl.gcs.heard["MISSION_ITEM"]
+    assert (home.x, way.x, way.y, way.z) == pytest.approx((home.x, 47.397742, 8.545594, 7.0), abs=1e-5)
+    assert home.x == pytest.approx(47.397742, abs=1e-5)
+
+
+@AS_ARDUPILOT
+def test_home_and_origin_are_reported_as_they_change(sitl: Sitl) -> None:
+    assert not sitl.gcs.heard["HOME_POSITION"]
+    sitl.arm()
+    sitl.run(0.1)
+    assert sitl.gcs.heard["HOME_POSITION"]
+    place = {"x": 473977000, "y": 85456000}
+    assert sitl.gcs.order_int(mav.MAV_CMD_DO_SET_HOME, frame=GLOBAL, **place, z=490.0) == ACCEPTED
+    sitl.run(0.1)
+    home = sitl.gcs.latest("HOME_POSITION")
+    assert (home.latitude, home.longitude, home.altitude) == (*place.values(), 490_000)
+
+
+@AS_ARDUPILOT
+def test_the_vehicle_looks_along_its_way(sitl: Sitl) -> None:
+    sitl.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, float(mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT), 1e5)
+    sitl.takeoff(2.0)
+    sitl.command(mav.MAV_CMD_CONDITION_YAW, 180.0)
+    sitl.goto(10.0, 0.0, 2.0, wait=False)
+    sitl.run(0.3)
+    assert sitl.gcs.latest("NAV_CONTROLLER_OUTPUT").wp_dist == pytest.approx(10.0, abs=1.0)
+    sitl.wait_until(lambda: near_angle(heading(sitl), 90.0), within=5.0)
+    item = (0, RELATIVE, mav.MAV_CMD_NAV_WAYPOINT, 3, 1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, MISSION)
+    sitl.send("MISSION_ITEM", 1, 1, *item)  # changes the height
+    sitl.wait_until(lambda: sitl.position[2] > 3.5, within=5.0)
+    southward = items.Item(mav.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 180.0), (10.0, 20.0, 4.0))
+    sitl.upload_mission([items.takeoff(2.0), southward])
+    sitl.select("AUTO")
+    sitl.wait_until(lambda: near_angle(heading(sitl), 0.0, 20.0), within=6.0)
 
 
 @AS_ARDUPILOT
