@@ -173,7 +173,7 @@ class Decision(NamedTuple):
     """A control law's decision.
 
     Attributes:
-        rotor_speeds: In the vehicle's unit and rotor order, within its limits, (4,).
+        rotor_speeds: In the vehicle's unit and rotor order, within its limits, (rotors,).
         attitude_reference: Commanded phi, theta, psi, rad.
     """
 
