@@ -217,6 +217,7 @@ class MissionService:
         self._stream_us = self._due_us = 0
 
     def _count(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        self._downloads.end(peer, fields.mission_type)
         return self._explained([self._uploads.begin(peer, fields.mission_type, fields.count, now_us)])
 
     def _item(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
@@ -310,6 +311,7 @@ class MissionService:
         if not 0 <= first <= last < len(plan.items):
             why = f"items {first} to {last} are not within 0 to {len(plan.items) - 1}"
             return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, MISSION, why)
+        self._downloads.end(peer, MISSION)
         count = last - first + 1
         return self._explained([self._uploads.begin(peer, MISSION, count, now_us, first=first, replaces=plan.items)])
 

@@ -46,6 +46,10 @@ class Radio(Manual):
         self._overrides: dict[int, int] = {}
         self._overridden_us = 0
 
+    def transmit(self, channels: tuple[int, ...]) -> None:
+        """Set the channels without overrides, us."""
+        self._transmitter = channels
+
     def _decode(self, message: Any, peer: Peer, now_us: int) -> Controls | None:
         if peer.system != self._settings["SYSID_MYGCS"]:
             raise Refused("another ground station")

@@ -27,7 +27,7 @@ ITEMS = [some_item(number) for number in range(3)]
 
 
 class Ground:
-    def __init__(self, rules: Rules = VALID) -> None:
+    def __init__(self, rules: Rules = VALID, *, old_form: bool | None = None) -> None:
         self.loaded: list[tuple[int, StoredPlan]] = []
         self.progress = MissionProgress()
         self.set: list[tuple[int, bool]] = []
@@ -40,7 +40,7 @@ class Ground:
             self._set_current,
             self._guided_goto,
         )
-        self.service = MissionService(dict.fromkeys(PLAN_TYPES, rules), vehicle, StatusText())
+        self.service = MissionService(dict.fromkeys(PLAN_TYPES, rules), vehicle, StatusText(), old_form=old_form)
         self.codec = Codec(*VEHICLE)
         self.now_us = 0
 

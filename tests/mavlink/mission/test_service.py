@@ -252,6 +252,18 @@ def test_a_station_that_knows_only_the_old_messages() -> None:
     ]
 
 
+def test_old_requests_are_answered_with_degrees() -> None:
+    """As ArduPilot, whose clients replace a mission and read it back at once."""
+    ground = Ground(old_form=True)
+    for latitude in (47.5, 48.5):
+        count(ground, 2)
+        for seq in range(2):
+            ground.hear(FIRST, "MISSION_ITEM", *VEHICLE, seq, 3, 16, 0, 1, 0, 0, 0, 0, latitude, -8.25, 20.0)
+        (item,) = ground.hear(FIRST, "MISSION_REQUEST", *VEHICLE, 1, MISSION)
+        assert (item.name, item.fields.x, item.fields.y) == ("MISSION_ITEM", pytest.approx(latitude), -8.25)
+        ground.hear(FIRST, "MISSION_REQUEST_LIST", *VEHICLE, MISSION)
+
+
 def test_a_nack_of_the_old_request_switches_to_the_new_one() -> None:
     """As MAVSDK."""
     ground = Ground()

@@ -1,0 +1,1 @@
+"""ArduPilot's own tests, flown on Colibri: a judge from outside."""
