@@ -18,6 +18,7 @@ from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.common.errors import unknown
+from colibri.common.process.lifecycle import one_line
 from colibri.conformance.subject import profile_for
 from colibri.studies.comparison import contenders_of
 
@@ -26,21 +27,22 @@ DEFAULT_LAWS = ("agile", "flight", "se3")
 
 def arena(args: Namespace) -> int:
     """Fly each set in a folder of its name, and print its tables."""
-    laws, sets, code = laws_of(args.law or DEFAULT_LAWS), list(dict.fromkeys(args.sets)), 0
-    if len(sets) > 1 and (args.json or args.junit):
-        raise CampaignError(f'{"--json" if args.json else "--junit"}: takes one set, not "{" ".join(sets)}"')
-    for name, planned in [(name, planned_of(name, laws, args.starts)) for name in sets]:
-        planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
-        out, engine = args.out / Path(name).stem, engine_of(args.workers, args.dask)
-        with closing(FlightBar(name, planned.flights, quiet=args.quiet)) as bar:
-            watch: dict[str, Any] = {"progress": bar.ended, "begun": bar.begun}
-            results = fly_campaign(planned, engine, out, resume=args.resume, kind=ArenaResults, **watch)
-        assert isinstance(results, ArenaResults)
-        if not (args.quiet or args.json):
-            print_table(f"{name}: worst mean error, mm; written to {out}", *results.table(), names=3)
-            print_table(f"{name}: laws", *results.law_table(), names=1)
-        code = max(code, handed_over(results, args))
-    return code
+    with one_line(kept=f"; finished flights are in {args.out}: continue with --resume"):
+        laws, sets, code = laws_of(args.law or DEFAULT_LAWS), list(dict.fromkeys(args.sets)), 0
+        if len(sets) > 1 and (args.json or args.junit):
+            raise CampaignError(f'{"--json" if args.json else "--junit"}: takes one set, not "{" ".join(sets)}"')
+        for name, planned in [(name, planned_of(name, laws, args.starts)) for name in sets]:
+            planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
+            out, engine = args.out / Path(name).stem, engine_of(args.workers, args.dask)
+            with closing(FlightBar(name, planned.flights, quiet=args.quiet)) as bar:
+                watch: dict[str, Any] = {"progress": bar.ended, "begun": bar.begun}
+                results = fly_campaign(planned, engine, out, resume=args.resume, kind=ArenaResults, **watch)
+            assert isinstance(results, ArenaResults)
+            if not (args.quiet or args.json):
+                print_table(f"{name}: worst mean error, mm; written to {out}", *results.table(), names=3)
+                print_table(f"{name}: laws", *results.law_table(), names=1)
+            code = max(code, handed_over(results, args))
+        return code
 
 
 def planned_of(name: str, laws: dict[str, dict[str, Any]], starts: int) -> Campaign:

@@ -20,6 +20,7 @@ from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.common.types import Array
+from colibri.flights.folder import occupied
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 _SHOWN = 60
@@ -102,7 +103,12 @@ class UncertifiableError(Error):
     """A profile whose law cannot be certified."""
 
 
-def certify_profile(args: Namespace) -> int:
+def certify(args: Namespace) -> int:
+    with occupied(args.out):
+        return _certify(args)
+
+
+def _certify(args: Namespace) -> int:
     with one_line():
         profile = load_profile(args.profile).with_choices(args.controller, None)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 
-from colibri.cli.shared.commands import PROCESSES
-from colibri.cli.shared.parser import parser_for, subcommand
+from colibri.cli.commands import COMMANDS, PROCESSES
+from colibri.cli.parser import parser_for
 from colibri.common.errors import Error
 from colibri.common.process import lifecycle
 from colibri.common.process.output import use_streams
@@ -41,7 +41,9 @@ def main(argv: list[str] | None = None) -> int:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             lifecycle.fail("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
         use_writable_folders()
-        code = subcommand(args.command).run(args)
+        with lifecycle.loading():
+            run = COMMANDS[args.command].load()
+        code = run(args)
         sys.stdout.flush()
         return code
     except Error as error:

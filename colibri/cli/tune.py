@@ -1,59 +1,37 @@
 """`colibri tune`."""
 
-from argparse import SUPPRESS, Namespace
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from colibri.cli.shared.options import add_engine, add_out
-from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import loading, one_line
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
-if TYPE_CHECKING:
-    from colibri.tuning.results import TuningResults
-    from colibri.tuning.run import Watcher
+from colibri.analysis.tables import print_table
+from colibri.common.process.lifecycle import one_line
+from colibri.tuning.results import TuningResults
+from colibri.tuning.run import Watcher
+from colibri.tuning.run import tune as tuned
 
 _TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
 
 
-def add_options(parser: ArgumentParser) -> None:
-    add = parser.value
-    add("file", "FILE.toml", "the tuning; options take precedence over it", type=Path)
-    add("--trials", "N", "how many, the profile as it is among them", type=int, default=SUPPRESS)
-    add("--seeds", "FIRST-LAST", "seeds of each trial", default=SUPPRESS)
-    add("--check-seeds", "FIRST-LAST", "seeds of the validation, which no trial flies", default=SUPPRESS)
-    add("--root-seed", "N", "seed of the search and of draws", type=int, default=SUPPRESS)
-    add("--prune-after", "N", "seeds between two decisions to stop a trial; 0: never stop", type=int, default=SUPPRESS)
-    parser.add_argument("--name", default=SUPPRESS, help="in titles (default: the file's)")
-    add_engine(parser)
-    parser.flag("--resume", "continue the tuning in --out, or join running processes")
-    add_out(parser, "out/tune", "profile, tables, figures and journal")
-
-
-def run(args: Namespace) -> int:
-    with loading():
-        from colibri.tuning.run import tune
-
+def tune(args: Namespace) -> int:
     given = {name: value for name, value in vars(args).items() if name in _TABLES}
     title = args.name if "name" in args else args.file.stem
     kept = f"; finished trials are in {args.out}: continue with --resume"
     with one_line(kept=kept), _progress(title, quiet=args.quiet) as watcher:
         shared = {"workers": args.workers, "executor": args.dask, "resume": args.resume}
-        results = tune(args.file, out=args.out, **shared, watcher=watcher, **given)
+        results = tuned(args.file, out=args.out, **shared, watcher=watcher, **given)
     if not args.quiet:
         _print(results, args.out)
     return 0
 
 
 @contextmanager
-def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TimeElapsedColumn
-
-    from colibri.tuning.run import Watcher
-
+def _progress(title: str, *, quiet: bool) -> Iterator[Watcher]:
     console = Console(stderr=True)
     columns = ("{task.description}", BarColumn(), "{task.fields[said]}", TimeElapsedColumn())
     bar = Progress(*columns, console=console, disable=quiet or not console.is_terminal)
@@ -81,9 +59,7 @@ def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
         yield Bar()
 
 
-def _print(results: "TuningResults", out: Path) -> None:
-    from colibri.analysis.tables import print_table
-
+def _print(results: TuningResults, out: Path) -> None:
     names = [objective.name for objective in results.tuning.objectives]
     first, best = results.trials[0], results.best
     flights = sum(trial.flights for trial in results.trials)
@@ -106,7 +82,7 @@ def _print(results: "TuningResults", out: Path) -> None:
         print_table(title, ("", "flights of", "before", "after", "change", "with 95 %"), shown, names=2)
 
 
-def _said(results: "TuningResults") -> str:
+def _said(results: TuningResults) -> str:
     if results.is_better:
         return "better"
     objectives = [each for each in results.verdict if each.is_objective and each.is_overall]

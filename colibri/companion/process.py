@@ -111,7 +111,7 @@ def _track_name(args: Namespace) -> str:
     return str(args.track)
 
 
-def fly(args: Namespace) -> int:
+def companion(args: Namespace) -> int:
     with one_line():
         plan = plan_of(args)
         signing, warning = _signing(args.signing_key)

@@ -106,7 +106,7 @@ def check_controller(
     return Conformance(subject.name, flown_by, tuple(rows()))
 
 
-def check_by_command(args: argparse.Namespace) -> int:
+def command(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     console = Console(stderr=True)

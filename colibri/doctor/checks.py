@@ -7,6 +7,7 @@ import re
 import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from enum import StrEnum
 from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution, version
@@ -19,7 +20,7 @@ from packaging.requirements import Requirement
 
 import colibri
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED
+from colibri.common.process.lifecycle import EXIT_FAILED, one_line
 from colibri.common.types import Address
 from colibri.flights.fleet_spec import GROUND_PORT, PLANT_PORT, SDK_PORT
 from colibri.mavlink.links.link import GroundLink
@@ -277,15 +278,15 @@ def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
             yield from found
 
 
-def examine_as_told(args: argparse.Namespace) -> int:
-    link = None if args.gcs is None else open_ground_link(args.gcs)
-    asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
+def doctor(args: argparse.Namespace) -> int:
     failed = 0
-    for finding in examine([*CHECKS, *asked]):
-        failed += finding.verdict is Severity.FAILED
-        show(finding)
-    if link is not None:
-        link.close()
+    with one_line(), ExitStack() as held:
+        asked: list[Check] = []
+        if args.gcs is not None:
+            asked.append(partial(ground_station, held.enter_context(closing(open_ground_link(args.gcs))), args.within))
+        for finding in examine([*CHECKS, *asked]):
+            failed += finding.verdict is Severity.FAILED
+            show(finding)
     return EXIT_FAILED if failed else 0
 
 

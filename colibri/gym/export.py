@@ -1,9 +1,11 @@
 """Policies as control laws: an ONNX model, and a TOML file of its inputs and outputs."""
 
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +48,15 @@ def export_policy(path: str | Path, env: Any, layers: Layers | None = None) -> P
     lines = [f"{key} = {msgspec.json.encode(value).decode()}" for key, value in msgspec.structs.asdict(inputs).items()]
     table.write_text("\n".join([_HEAD.format(path.name), *lines, ""]), encoding="utf-8")
     return table
+
+
+def gym(args: Namespace) -> int:
+    try:
+        env = gymnasium.make(args.env, disable_env_checker=True, **dict(args.set))
+    except gymnasium.error.Error as error:
+        raise GymError(f"--env: {error}") from None
+    print(export_policy(args.policy, env))  # noqa: T201
+    return 0
 
 
 def _inputs(episodes: Episodes) -> PolicyInputs:

@@ -2,16 +2,19 @@
 
 import argparse
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import msgspec
+import numpy as np
 
+from colibri.analysis.estimation import MEASURED, rms
 from colibri.analysis.recording import SETTLED_AFTER_S
-from colibri.analysis.tables import Row, print_table, write_table
+from colibri.analysis.tables import Row, comma_separated, print_table, write_table
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Point, campaign_of
@@ -24,10 +27,13 @@ from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes
+from colibri.common.process.lifecycle import one_line
 from colibri.common.spec import keywords_of
-from colibri.flights.folder import make_folder, prepare
+from colibri.common.types import Array
+from colibri.flights.folder import make_folder, occupied, prepare
 from colibri.flights.provenance import provenance_of
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.vehicle.description import Vehicle
 
 DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
@@ -175,6 +181,11 @@ _FORMATS = (".4g", ".4g", ".4g", ".0f", ".0f")
 
 
 def compare(args: argparse.Namespace) -> int:
+    with occupied(args.out), one_line():
+        return _compare_seeds(args) if args.seeds else _compare(args)
+
+
+def _compare(args: argparse.Namespace) -> int:
     """Compare; RMS excludes the first 20 s, the maximum does not."""
     table = fly_comparison(args, "compare", with_limits(_METRICS, args.fail_above), "all")
     rows = [(*names, *_cells(table.flown[place])) for names, (place,) in table.groups().items()]
@@ -197,3 +208,58 @@ def _cells(flown: FlightResult) -> Row:
     if flown.verdict is Verdict.FLOWN:
         return (*cells, "", "")
     return (*cells, f"{lost_at_s:.2f}" if lost_at_s is not None else "0", flown.why)
+
+
+SEED_HEADINGS = (
+    *("profile", "track", "flights", "lost"),
+    *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
+    "NEES",
+)
+_WITHOUT_ESTIMATE = 5
+"""Columns of a flight on the state."""
+_SEED_ERRORS = (
+    *("control_rmse_m", "rmse_after_20s_m", "estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
+    *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw"),
+)
+NEES = "nees_mean"
+
+
+SEED_METRICS = (
+    *map(Metric, (*_SEED_ERRORS, NEES)),
+    *(Metric(f"nis_mean.{kind}.{figure}") for kind in MEASURED for figure in ("mean", "innovations")),
+)
+"""RMS of one flight after 20 s, m and degrees; mean NEES; by kind mean NIS, relative, and innovations."""
+
+
+def _compare_seeds(args: argparse.Namespace) -> int:
+    table = fly_comparison(args, "seeds", with_limits(SEED_METRICS, args.fail_above), "none")
+    (args.out / "seeds-flights.csv").write_text(comma_separated(table.headings, table.rows()), encoding="utf-8")
+    rows = [(*names, *_seed_cells(table, places)) for names, places in table.groups().items()]
+    write_table(args.out / "seeds", SEED_HEADINGS, rows, names=2, notes=table.notes)
+    from colibri.studies.seed_figures import draw_seeds
+
+    draw_seeds(table, args.out)
+    lost = [each for each in table.flown if each.verdict is not Verdict.FLOWN]
+    if not (args.quiet or args.json):
+        over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
+        shown = len(SEED_HEADINGS) if args.feedback is Feedback.SENSORS else _WITHOUT_ESTIMATE
+        print_table(f"{over}; written to {args.out}", SEED_HEADINGS[:shown], [row[:shown] for row in rows], names=2)
+        print(*table.notes, sep="\n", end="\n" if table.notes else "")  # noqa: T201
+        for flown, row in zip(table.flown, table.rows(), strict=True):
+            if flown in lost:
+                print(f"{row[1]}, {row[2]}, seed {row[3]}: lost: {flown.why}")  # noqa: T201
+    return handed_over(table, args)
+
+
+def _seed_cells(table: FlightTable, places: Sequence[int]) -> Row:
+    """Return RMS over flights, mean NEES, and in brackets the largest."""
+    through = table.through(places)
+    errors = (_seed_cell(table.metric(name)[through], rms) for name in _SEED_ERRORS)
+    flown, lost = str(len(places)), str(len(places) - len(through))
+    return (flown, lost, *errors, _seed_cell(table.metric(NEES)[through], np.mean))
+
+
+def _seed_cell(column: Array, middle: Callable[[Array], Any]) -> str:
+    if not len(column) or np.isnan(column).any():
+        return "-"
+    return f"{middle(column):.3g} ({column.max():.3g})"

@@ -10,6 +10,7 @@ from colibri.flights.fly import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.verification.cases import SHOWN, TrackCase, show_table
+from colibri.verification.golden import verify_golden
 
 DEFAULT_DURATION_S = 20.0
 
@@ -37,6 +38,8 @@ class CaseResult(NamedTuple):
 
 
 def verify(args: argparse.Namespace) -> int:
+    if args.golden is not None:
+        return verify_golden(args)
     if args.renew or args.only:
         fail(f"--{'renew' if args.renew else 'only'} goes with --golden alone")
     if args.duration is None:

@@ -100,5 +100,5 @@ def test_only_a_flight_that_began_names_its_logs(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("colibri.cli.shared.fly_and_report.fly_plan", fail)
+    monkeypatch.setattr("colibri.cli.flying.fly_plan", fail)
     assert refused("fly", "hover", "--quiet", "--out", tmp_path, code=code) == line.format(out=tmp_path)

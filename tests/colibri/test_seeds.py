@@ -16,7 +16,7 @@ from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
-from colibri.studies.seeds import METRICS
+from colibri.studies.comparison import SEED_METRICS
 from tests.support.campaigns import Here
 from tests.support.commands import FLIGHT, Ran, Refused
 
@@ -34,7 +34,7 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, ran: Ran) 
     assert len({flight["trajectory_sha256"] for flight in flights}) == 2
     for flight in flights:
         assert (flight["verdict"], flight["why"]) == ("flown", "")
-        errors = [metric.name for metric in METRICS if not metric.name.startswith("nis_mean.")]
+        errors = [metric.name for metric in SEED_METRICS if not metric.name.startswith("nis_mean.")]
         assert all(0.0 < float(flight[name]) < 50.0 for name in errors)
         assert float(flight["control_rmse_m"]) < float(flight["rmse_after_20s_m"])
         assert all(float(flight[f"nis_mean.{kind}.innovations"]) > 0.0 for kind in MEASURED_HERE)
@@ -46,7 +46,7 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, ran: Ran) 
 
 def test_a_vehicle_has_some_of_the_kinds_in_their_order() -> None:
     assert [kind for kind in MEASURED if kind in MEASURED_HERE] == MEASURED_HERE
-    assert {f"nis_mean.{kind}.mean" for kind in MEASURED} <= {metric.name for metric in METRICS}
+    assert {f"nis_mean.{kind}.mean" for kind in MEASURED} <= {metric.name for metric in SEED_METRICS}
 
 
 def test_what_is_there_is_not_flown_again(
@@ -88,10 +88,10 @@ def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
 def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     monkeypatch.setattr(seed_figures, "write_figure", lambda figure, _path: drawn.append(figure))
-    values = tuple(0.1 + number if estimated or number < 2 else None for number in range(len(METRICS)))
+    values = tuple(0.1 + number if estimated or number < 2 else None for number in range(len(SEED_METRICS)))
     names = ("my-longest-profile.toml:geometric-se3", "flight")
     grid = {"contender": {name: {"profile": "flight"} for name in names}, "track": ["circle:radius=3,speed=4"]}
-    planned = campaign_of(CampaignTables(seeds="1-2", grid=grid, metrics=METRICS))
+    planned = campaign_of(CampaignTables(seeds="1-2", grid=grid, metrics=SEED_METRICS))
     verdicts = {names[0]: Verdict.LOST, names[1]: Verdict.FLOWN}
     flown = {
         point.flight: FlightResult(point.flight, verdicts[shown(point.factors["contender"])], "", values, "")

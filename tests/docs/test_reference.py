@@ -12,7 +12,7 @@ from colibri.analysis.estimation import FIGURES
 from colibri.analysis.recording import COLUMNS
 from colibri.analysis.report import report
 from colibri.autopilot.control.registry import controller_names
-from colibri.cli.shared.commands import COMMANDS
+from colibri.cli.commands import COMMANDS
 from tests.support.pages import DOCS
 from tools.pages import parameters
 from tools.pages.reference import command_line, files, keys, messages, python

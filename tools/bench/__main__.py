@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from colibri.bench.run import bench
 from colibri.bench.speed import PeerSimulator
-from colibri.cli.computer.bench import add_options
+from colibri.cli.options import bench as add_options
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail_interrupted, use_one_thread
 from tools.bench import rotorpy_peer

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.computer.completion import SHELLS
+from colibri.cli.commands import COMMANDS, PROCESSES
 from colibri.cli.main import main
-from colibri.cli.shared.commands import COMMANDS, PROCESSES
-from colibri.cli.shared.parser import parser_of, subcommand
+from colibri.cli.options import SHELLS
+from colibri.cli.parser import parser_of
 from colibri.flights.provenance import plan_of
 from tests.support.commands import FLIGHT, VEHICLE, Ran, Refused, edited, exit_code
 
@@ -24,7 +24,7 @@ MAX_HELP_S = 0.2
 """Of a core, startup of Python included."""
 HELP = """
 import sys
-from colibri.cli.computer.completion import SHELLS
+from colibri.cli.options import SHELLS
 from colibri.cli.main import main
 try:
     main(["--help"])
@@ -53,7 +53,7 @@ def test_every_example_of_the_help_is_a_command(command: str) -> None:
     for program, name, *options in given:
         assert (program, name) == ("colibri", command)
         parser_of(command).parse_args([name, *options])
-    assert callable(subcommand(command).run)
+    assert callable(COMMANDS[command].load())
 
 
 def test_help_fits_a_narrow_terminal(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.shared.commands import COMMANDS
-from colibri.cli.shared.parser import subcommand
+from colibri.cli.commands import COMMANDS
+from colibri.cli.parser import add_options
 from colibri.common.errors import Error, InFlightError
 from colibri.common.process.arguments import ArgumentParser
 from tests.support.commands import Refused
@@ -170,7 +170,7 @@ def test_help_of_every_link_names_serial_ports() -> None:
     links: dict[str, str] = {}
     for name in COMMANDS:
         parser = ArgumentParser()
-        subcommand(name).add_options(parser)
+        add_options(name, parser)
         options = re.split(r"\n  (?=\S)", parser.format_help())
         one_line = [" ".join(option.split()) for option in options]
         links |= {f"{name} {option.split()[0]}": option for option in one_line if "tcp: or tcpin:" in option}

@@ -8,7 +8,7 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import GROUP
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.cli.computer.verify import GOLDEN_HASHES
+from colibri.cli.options import GOLDEN_HASHES
 from colibri.sitl.vehicle import Sitl
 from colibri.verification import golden, golden_flights
 from colibri.verification.cases import SitlCase, TrackCase

@@ -1,110 +1,118 @@
 """The subcommands with their descriptions and examples."""
 
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from textwrap import dedent
 from typing import NamedTuple
 
 
 class CommandEntry(NamedTuple):
-    """A subcommand; each of the `examples` has a line, with its purpose after a `#`."""
+    """A subcommand: its function and module; each of the `examples` has a line, with its purpose after a `#`."""
 
     does: str
     module: str
+    function: str
     examples: str
+
+    def load(self) -> Callable[[Namespace], int]:
+        run: Callable[[Namespace], int] = getattr(import_module(self.module), self.function)
+        return run
 
 
 _TEXTS = {
     "fly": {
-        "fly": """fly a track and report how well it went
+        "fly cli.viewing": """fly a track and report how well it went
             colibri fly spiral                                # report and figures in out/
             colibri fly lemniscate:lap=5 --wind 5@270         # in wind from the west
             colibri fly circle --feedback sensors --seed 3    # by estimates""",
-        "sitl": """stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy
+        "sitl cli.viewing": """stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy
             colibri sitl                                      # then start QGroundControl
             colibri sitl --count 3                            # a fleet of three
             colibri sitl --feedback sensors --turbulence light --speed 1""",
-        "viewer.view": """see flights, or a MAVLink vehicle, fly in a browser
+        "view cli.viewing": """see flights, or a MAVLink vehicle, fly in a browser
             colibri view out/spiral
             colibri view out/spiral out/other    # two flights in one picture
             colibri view udpin:127.0.0.1:14550""",
-        "plot": """draw the figures of a flight, however it ended
+        "plot cli.recorded": """draw the figures of a flight, however it ended
             colibri plot out/spiral""",
-        "export": """write the topics of a flight's ULog as MCAP, CSV or Parquet
+        "export cli.recorded": """write the topics of a flight's ULog as MCAP, CSV or Parquet
             colibri export out/spiral --mcap           # for Foxglove
             colibri export out/spiral --csv            # a table of each topic""",
-        "replay": """replay a recorded flight, and compare the autopilot's answers
+        "replay flights.replay": """replay a recorded flight, and compare the autopilot's answers
             colibri replay out/spiral""",
     },
     "many flights": {
-        "campaigns.campaign": """fly every combination of factors, by many seeds, into one table
+        "campaign cli.campaign": """fly every combination of factors, by many seeds, into one table
             colibri campaign mass.toml --out out/mass
             colibri campaign mass.toml --out out/mass --resume    # go on with it
             colibri campaign --track spiral --set feedback=state,sensors --seeds 1-10""",
-        "tune": """tune numbers of a profile, and validate them on other seeds
+        "tune cli.tune": """tune numbers of a profile, and validate them on other seeds
             colibri tune weights.toml --out out/tune
             colibri tune weights.toml --out out/tune --resume     # go on, or join""",
-        "campaigns.compare": """fly several controllers on several tracks, side by side
+        "compare studies.comparison": """fly several controllers on several tracks, side by side
             colibri compare --profile flight --profile se3 --track spiral
             colibri compare --track circle --seeds 1-20 --turbulence light""",
-        "campaigns.arena": """fly control laws on a set's tracks and disturbances, beside published values
+        "arena arena.run": """fly control laws on a set's tracks and disturbances, beside published values
             colibri arena race --law agile --law my_law.py:Law    # cells of SSI-MPC
             colibri arena robust policy --starts 1""",
-        "campaigns.study": """fly the studies of profile flight, and draw them
+        "study studies.studies": """fly the studies of profile flight, and draw them
             colibri study speed robustness    # two of the studies; without a name all""",
-        "campaigns.figures": """fly the thesis's flights and draw its figures
+        "figures studies.thesis_figures": """fly the thesis's flights and draw its figures
             colibri figures --only 4.9""",
     },
     "vehicles of others": {
-        "vehicles.companion": """fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion
+        "companion companion.process": """fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion
             colibri companion spiral --vehicle udpin:127.0.0.1:14540 --dry-run
             colibri companion circle --vehicle udpin:127.0.0.1:14540 --arm""",
-        "descriptions.vehicle": """write a new vehicle's file, or parameters of PX4 or ArduPilot
+        "vehicle cli.descriptions": """write a new vehicle's file, or parameters of PX4 or ArduPilot
             colibri vehicle new x --mass 2 --arm .25 --propeller 1045 --hover-throttle .5
             colibri vehicle hummingbird --for px4 --out hummingbird.params""",
     },
     "control laws": {
-        "laws.check-controller": """check a control law against the requirements on all of them
+        "check-controller conformance.check:command": """check a control law against the requirements on all of them
             colibri check-controller geometric-se3
             colibri check-controller lpv-mpc --only memory --only limits""",
-        "laws.gym": """write a learned policy's inputs and outputs, so that it flies as a control law
+        "gym gym.export": """write a learned policy's inputs and outputs, so that it flies as a control law
             colibri gym export policy.onnx    # then: fly --controller policy.onnx
             colibri gym export policy.onnx --env colibri/Hover-v0 --set action=rates""",
-        "laws.certify": """certify a profile's attitude law
+        "certify certification.report": """certify a profile's attitude law
             colibri certify flight --controller lpv-mpc""",
     },
     "profiles and vehicles": {
-        "descriptions.show": """print the file of a profile or vehicle, to copy and change
+        "show cli.descriptions": """print the file of a profile or vehicle, to copy and change
             colibri show profile flight > mine.toml
             colibri show vehicle hummingbird"""
     },
     "this computer": {
-        "computer.compile": """compile what flights and flight tests need, beforehand
+        "compile cli.compilation": """compile what flights and flight tests need, beforehand
             colibri compile           # once after installation, in CI before pytest
             colibri compile flight    # only what a flight with the profile flight needs""",
-        "computer.doctor": """look whether everything is there that flights need
+        "doctor doctor.checks": """look whether everything is there that flights need
             colibri doctor
             colibri doctor --gcs    # wait for a ground station, too""",
-        "computer.bench": """measure how fast it flies
+        "bench bench.run": """measure how fast it flies
             colibri bench --only commands
             colibri bench --only stages --runs 1""",
-        "computer.verify": """fly a fixed set of flights: is every bit the same, twice, or as it once was?
+        "verify verification.verify": """fly a fixed set of flights: is every bit the same, twice, or as it once was?
             colibri verify --link memory""",
-        "computer.completion": """print a script that completes these commands in a shell
+        "completion cli.completion": """print a script that completes these commands in a shell
             colibri completion bash > ~/.local/share/bash-completion/completions/colibri
             colibri completion zsh > ~/.zfunc/_colibri""",
     },
 }
-"""By purpose: the file of each subcommand, in one line what it does, and its examples."""
+"""By purpose: each subcommand with the module of the function of its name, what it does, and its examples."""
 
 
-def _entry(path: str, text: str) -> CommandEntry:
-    does, _, examples = text.partition("\n")
-    return CommandEntry(does, f"colibri.cli.{path.replace('-', '_')}", dedent(examples))
+def _entries(texts: dict[str, str]) -> Iterator[tuple[str, CommandEntry]]:
+    for key, text in texts.items():
+        name, _, place = key.partition(" ")
+        module, _, function = place.partition(":")
+        does, _, examples = text.partition("\n")
+        yield name, CommandEntry(does, f"colibri.{module}", function or name, dedent(examples))
 
 
-GROUPS = {
-    group: {path.rpartition(".")[2]: _entry(path, text) for path, text in texts.items()}
-    for group, texts in _TEXTS.items()
-}
+GROUPS = {group: dict(_entries(texts)) for group, texts in _TEXTS.items()}
 COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}
 PROCESSES = {
     "plant": "the vehicle and its world, waiting for an autopilot",

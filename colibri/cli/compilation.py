@@ -8,9 +8,9 @@ from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
+from colibri.campaigns.engines.pool import in_order
 from colibri.common.errors import unknown
-from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, loading, one_line
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 
 FLIGHTS: dict[str, dict[str, Any]] = {
     "flight": {},
@@ -24,15 +24,7 @@ _SHARED_BY = 2
 """Processes that fly each: what one compiles, the other need not; further ones would mostly wait."""
 
 
-def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("what", nargs="*", help="flight, thesis, sensors, path, tests (default all of them)")
-    parser.flag("--quiet", "print errors only")
-
-
-def run(args: Namespace) -> int:
-    with loading():
-        from colibri.campaigns.engines.pool import in_order
-
+def compile(args: Namespace) -> int:
     began_s = perf_counter()
     for name in args.what:
         if name not in FLIGHTS:

@@ -1,47 +1,47 @@
-"""`colibri vehicle`."""
+"""`colibri show` and `colibri vehicle`: files of profiles and vehicles."""
 
 import shlex
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
 
+from colibri.autopilot.control.profile import load_profile, profile_text
+from colibri.autopilot.control.scaling import capability_of, formulas
 from colibri.common.errors import unknown
 from colibri.common.files import read_text, write_bytes
-from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail, one_line
+from colibri.plant.vehicle.data_sheets import LAYOUTS, DataSheet, propeller_of, thrust_stand_of, vehicle_file
+from colibri.plant.vehicle.description import VehicleError, load_vehicle, vehicle_text
+from colibri.plant.vehicle.parameter_files import FILES
 
 
-def add_options(parser: ArgumentParser) -> None:
-    add = parser.value
-    add("name", "NAME", "vehicle name or .toml; or new: write the file of a new vehicle")
-    add("new_name", "NEW", "of new: its name", nargs="?")
-    loaded_by = "px4: a file that QGroundControl loads; ardupilot: one that SITL, MAVProxy and Mission Planner load"
-    parser.add_argument("--for", choices=("px4", "ardupilot"), dest="whom", help=loaded_by)
-    add("--out", "FILE", "where to write (default: standard output; of new, NEW.toml)", type=Path)
-    add("--mass", "KG", "of new: ready to fly, with battery", type=float)
-    add("--arm", "M", "of new: from the centre to a motor", type=float)
-    add("--wheelbase", "M", "of new: from motor to opposite motor, in place of --arm", type=float)
-    layouts = "x, + or h (x, turning the other way), hexa-x, hexa-+, octo-x, octo-+, x8 or y6"
-    add("--layout", "NAME", f"of new: {layouts} (default x)", default="x")
-    order = "of new: order of the rotors; clockwise: from the front (right) on (default px4, as ArduPilot's)"
-    parser.add_argument("--order", choices=("px4", "clockwise"), default="px4", help=order)
-    add("--propeller", "SIZE", "of new: inches as 10x4.5 or 1045, or millimetres as 45mm")
-    parser.add_argument(
-        "--motor", choices=("brushless", "brushed"), help="of new: required for one cell and below 60 mm"
-    )
-    add("--kv", "RPM/V", "of new: the motors' speed constant", type=float)
-    add("--cells", "N", "of new: lithium cells in series", type=int)
-    add("--capacity", "AH", "of new: of the battery, which is then modelled", type=float)
-    add("--hover-throttle", "PART", "of new: of the largest thrust, as in MPC_THR_HOVER or MOT_THST_HOVER", type=float)
-    add("--thrust-stand", "FILE", "of new: CSV with throttle, thrust_g, speed_rpm, current_a", type=Path)
-    add("--lag", "S", "of new: measured time constant of the rotors", type=float)
-    add("--inertia", "X,Y,Z", "of new: measured moments of inertia, kg m²")
-    add("--drag", "N_S_M", "of new: measured horizontal drag, N for each m/s", type=float)
-    parser.flag("--force", "of new: overwrite the file")
+def show(args: Namespace) -> int:
+    with one_line():
+        if args.what == "law":
+            _show_law(args)
+        elif args.name is None:
+            fail(f"show {args.what}: a name is required")
+        else:
+            sys.stdout.write(profile_text(args.name) if args.what == "profile" else vehicle_text(args.name))
+    return 0
 
 
-def run(args: Namespace) -> int:
+def _show_law(args: Namespace) -> None:
+    profile = load_profile(args.profile).with_choices(args.controller or args.name, None)
+    described = load_vehicle(args.vehicle or profile.simulation.vehicle)
+    law, found = profile.controller, profile.of(described)
+    rows = [(name, value, "") for name, value in capability_of(described)._asdict().items()]
+    for key, formula in formulas(law).items():
+        room, _, name = key.rpartition(".")
+        table = profile.table(law)[room] if room else profile.table(law)
+        value = found.value(f"controllers.{law}.{key}")
+        rows.append((key, value, "given by the profile" if name in table else f"= {formula}"))
+    for name, value, formula in rows:
+        numbers = ", ".join(f"{each:.4g}" for each in (value if isinstance(value, (list, tuple)) else [value]))
+        sys.stdout.write(f"{name:<34}{numbers:<22}{formula}".rstrip() + "\n")
+
+
+def vehicle(args: Namespace) -> int:
     if args.name == "new":
         return _new(args)
     if args.new_name is not None:
@@ -52,13 +52,10 @@ def run(args: Namespace) -> int:
     stray = next((option for option in of_new if getattr(args, option) is not None), None)
     if stray:
         fail(f"--{stray} is an option of vehicle new NAME")
-    from colibri.plant.vehicle.description import load_vehicle
-    from colibri.plant.vehicle.parameter_files import FILES
-
     with one_line():
-        vehicle = load_vehicle(args.name)
-        made_by = f"{vehicle.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
-        text = FILES[args.whom](vehicle, made_by)
+        described = load_vehicle(args.name)
+        made_by = f"{described.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
+        text = FILES[args.whom](described, made_by)
     if args.out is None:
         sys.stdout.write(text)
     else:
@@ -67,8 +64,6 @@ def run(args: Namespace) -> int:
 
 
 def _new(args: Namespace) -> int:
-    from colibri.plant.vehicle.data_sheets import vehicle_file
-
     if args.new_name is None:
         fail("vehicle new: a name is required")
     if args.whom is not None:
@@ -92,10 +87,7 @@ def _new(args: Namespace) -> int:
     return 0
 
 
-def _sheet(args: Namespace, name: str) -> Any:
-    from colibri.plant.vehicle.data_sheets import LAYOUTS, DataSheet, propeller_of, thrust_stand_of
-    from colibri.plant.vehicle.description import VehicleError
-
+def _sheet(args: Namespace, name: str) -> DataSheet:
     if args.arm is not None and args.wheelbase is not None:
         raise VehicleError("--arm and --wheelbase: give one of them")
     if args.layout not in LAYOUTS:

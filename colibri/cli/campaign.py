@@ -1,4 +1,4 @@
-"""Fly a campaign and print the results."""
+"""`colibri campaign`: fly a campaign and print the results."""
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ _SHOWN = 5
 _TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
 
 
-def fly(args: Namespace) -> int:
+def campaign(args: Namespace) -> int:
     with one_line(kept=f"; finished flights are in {args.out}: continue with --resume"):
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}

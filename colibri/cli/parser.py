@@ -1,23 +1,16 @@
 """The parser. Loads only the modules of requested subcommands."""
 
-from argparse import Action, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, RawDescriptionHelpFormatter
 from collections.abc import Generator, Sequence
-from importlib import import_module
 from shutil import get_terminal_size
 from textwrap import indent, wrap
-from typing import NoReturn, Protocol, cast
+from typing import NoReturn
 
-from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
+from colibri.cli.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.common.process.arguments import ArgumentParser
 
 _MIN_WIDTH, _MAX_WIDTH = 40, 120
 _NAME = 18
-
-
-class Subcommand(Protocol):
-    def add_options(self, parser: ArgumentParser) -> None: ...
-
-    def run(self, args: Namespace) -> int: ...
 
 
 class Version(Action):
@@ -57,7 +50,7 @@ def parser_of(*whole: str) -> ArgumentParser:
         options = commands.add_parser(name, help=command.does, description=command.does, epilog=examples)
         options.formatter_class = RawDescriptionHelpFormatter
         if name in whole:
-            subcommand(name).add_options(options)
+            add_options(name, options)
     for name, does in PROCESSES.items():
         commands.add_parser(name, help=does, add_help=False)
     return parser
@@ -73,5 +66,7 @@ def _listed() -> str:
     return "\n".join([*lines, "", "colibri COMMAND --help says more of each."])
 
 
-def subcommand(name: str) -> Subcommand:
-    return cast(Subcommand, import_module(COMMANDS[name].module))
+def add_options(name: str, parser: ArgumentParser) -> None:
+    from colibri.cli import options  # the list of commands does without
+
+    getattr(options, name.replace("-", "_"))(parser)

@@ -4,29 +4,26 @@ import re
 from argparse import Action, Namespace, _SubParsersAction
 from collections.abc import Callable, Sequence
 
+from shtab import DIRECTORY, FILE, complete
+
+from colibri.autopilot.__main__ import command_line as autopilot
+from colibri.autopilot.control.profile import profile_names
+from colibri.autopilot.control.registry import controller_names
+from colibri.autopilot.guidance.trajectories.registry import track_names
+from colibri.cli.commands import COMMANDS
+from colibri.cli.parser import parser_of
 from colibri.common.process.arguments import ArgumentParser
-
-SHELLS = ("bash", "zsh", "fish", "tcsh", "powershell")
-
-
-def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("shell", choices=SHELLS, help="whose; where the script goes is in the examples")
+from colibri.plant.__main__ import command_line as plant
+from colibri.plant.vehicle.description import vehicle_names
 
 
-def run(args: Namespace) -> int:
-    from shtab import complete
-
+def completion(args: Namespace) -> int:
     print(complete(completed_parser(), args.shell))
     return 0
 
 
 def completed_parser() -> ArgumentParser:
     """Return a parser with all possible values of arguments."""
-    from colibri.autopilot.__main__ import command_line as autopilot
-    from colibri.cli.shared.commands import COMMANDS
-    from colibri.cli.shared.parser import parser_of
-    from colibri.plant.__main__ import command_line as plant
-
     parser = parser_of(*COMMANDS)
     (commands,) = (action for action in parser._actions if isinstance(action, _SubParsersAction))  # noqa: SLF001
     commands.choices.update(plant=plant(), autopilot=autopilot())
@@ -38,11 +35,6 @@ def completed_parser() -> ArgumentParser:
 
 
 def _names() -> dict[str, Callable[[], Sequence[str]]]:
-    from colibri.autopilot.control.profile import profile_names
-    from colibri.autopilot.control.registry import controller_names
-    from colibri.autopilot.guidance.trajectories.registry import track_names
-    from colibri.plant.vehicle.description import vehicle_names
-
     return {
         **dict.fromkeys(("track", "tracks"), track_names),
         "profile": profile_names,
@@ -53,8 +45,6 @@ def _names() -> dict[str, Callable[[], Sequence[str]]]:
 
 
 def _complete(action: Action, command: str, names: dict[str, Callable[[], Sequence[str]]]) -> None:
-    from shtab import DIRECTORY, FILE
-
     metavar = action.metavar if isinstance(action.metavar, str) else ""
     named = command if action.dest == "name" and not action.option_strings else action.dest
     if action.nargs == 0 or action.choices is not None:

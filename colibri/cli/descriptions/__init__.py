@@ -1,1 +1,0 @@
-"""Subcommands about files of profiles and vehicles."""

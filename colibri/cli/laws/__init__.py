@@ -1,1 +1,0 @@
-"""Subcommands about a control law."""

@@ -1,1 +1,0 @@
-"""Parser, list of subcommands, and shared options."""

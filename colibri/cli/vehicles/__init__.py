@@ -1,1 +1,0 @@
-"""Commands that fly vehicles of others: `colibri companion`."""

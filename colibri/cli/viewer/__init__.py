@@ -1,1 +1,0 @@
-"""Subcommands that show flights in a browser."""

@@ -1,0 +1,82 @@
+"""`colibri view`, and the commands with `--view`: `fly` and `sitl`."""
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from colibri.common.process.lifecycle import fail, loading, one_line
+from colibri.common.spec import from_namespace
+
+_LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:", "serial:")
+
+
+def fly(args: Namespace) -> int:
+    with loading():
+        from colibri.cli.flying import fly as flown
+    if args.view and args.link != "udp":
+        fail(f"--view needs --link udp: over {args.link} no autopilot process runs")
+    with _viewed(args, args.gcs):
+        return flown(args)
+
+
+def sitl(args: Namespace) -> int:
+    from colibri.flights.fleet import sitl as fleet
+    from colibri.flights.fleet_spec import FleetSpec
+
+    if args.view and args.count > 1:
+        fail("--view shows one vehicle: leave --count out")
+    with _viewed(args, from_namespace(FleetSpec, args).links(args.instance)):
+        return fleet(from_namespace(FleetSpec, args), quiet=args.quiet)
+
+
+def view(args: Namespace) -> int:
+    links = [what for what in args.what if what.startswith(_LINKS)]
+    if links and len(args.what) > 1:
+        fail("one link, or folders of flights: a live vehicle and others are not shown together")
+    if links and args.export:
+        fail("--export writes flights that are over: give their folders")
+    if args.port > 65535:
+        fail(f"--port: must be from 0 to 65535, not {args.port}")
+    recorded = not links and not args.export
+    with _loading_viser():
+        if recorded:
+            from colibri.view.opening import show_recorded
+        else:
+            from colibri.view.run import export, show_live
+    with one_line():
+        if recorded:
+            show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
+        elif args.export:
+            export([Path(what) for what in args.what], args.export)
+        else:
+            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
+    return 0
+
+
+@contextmanager
+def _loading_viser() -> Iterator[None]:
+    """Load modules that import viser, if it is installed."""
+    try:
+        with loading():
+            yield
+    except ModuleNotFoundError as error:
+        if error.name not in ("viser", "websockets"):
+            raise
+        fail("the page needs viser: pip install 'colibri-sitl[view]'")
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+@contextmanager
+def _viewed(args: Namespace, links: list[str]) -> Iterator[None]:
+    if not args.view:
+        yield
+        return
+    with _loading_viser():
+        from colibri.view.run import page_beside
+    with one_line(), page_beside(_say) as link:
+        args.gcs = [*links, link]
+        yield
