@@ -63,6 +63,7 @@ class Sensed(NamedTuple):
         waited_us: Path time lost since the previous sample.
         path_speed: Rate of path time relative to the clock.
         lift: Modelled thrust over weight, once a sensor has failed.
+        push: Tilting moment then that the rotors do not cause, over that of a quarter of the weight at a rotor.
     """
 
     now_us: int = 0
@@ -73,6 +74,7 @@ class Sensed(NamedTuple):
     waited_us: int = 0
     path_speed: float = 1.0
     lift: float | None = None
+    push: float = 0.0
 
 
 class PilotRecord(NamedTuple):
@@ -291,8 +293,13 @@ class Pilot:
             self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
         if self.sensed.lift is not None and self._comes_down:
-            climb_m_s = context.state.velocity_enu_m_s[2]
-            self.ground.watch_lift(self.sensed.now_us, self.sensed.lift, climb_m_s, self.generator.interval_s)
+            now_us, lift, push, interval_s = (
+                self.sensed.now_us,
+                self.sensed.lift,
+                self.sensed.push,
+                self.generator.interval_s,
+            )
+            self.ground.watch_forces(now_us, context.state, lift, push, interval_s)
         ended = _ENDS.get(self.state.mode)
         if ended is not None and self.task.arrived(context):
             self.happened(ended)

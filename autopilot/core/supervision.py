@@ -46,8 +46,10 @@ class Supervision:
         steered, position_known = guard(table.SETPOINTS, self._sensed, _not_steered, now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
-        lift = parts.rotor_loss.watch.expected[0] / parts.loop.vehicle.gravity_m_s2 if self._doubts else None
-        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift))
+        lift, push, watch = None, 0.0, parts.rotor_loss.watch
+        if self._doubts:
+            lift, push = watch.expected[0] / parts.loop.vehicle.gravity_m_s2, watch.push
+        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push))
         guard(table.FAILSAFES, self._execute, table.nothing, now_us, state)
         if self._caught_us is not None:
             self._drift(now_us, self._caught_us, state)

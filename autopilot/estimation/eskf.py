@@ -54,6 +54,9 @@ _UNSURE_TURN = 2.0  # the attitude error may exceed the turn of the field, which
 _UNSURE_S = 0.5  # mean duration of the velocity error
 _MODELLED_M_S2, _MODELLED_RAD_S = 2.0, 0.2  # errors of a modelled force, by drag and mass, and of the rate at first
 _MISTURNED_RAD = 0.05  # error of the attitude by a gyroscope up to the detection of its failure
+_MISLED_RAD, _MISLED_RAD_S = 0.15, 0.02  # errors of attitude and gyroscope bias by a magnetometer that drifts
+_SURPRISE = 16.27  # χ² of three degrees of freedom, 0.1 %: the rotors do not explain the change of velocity
+_SHORTEST_S = 0.05  # least time in which an unknown force is taken to have acted
 _PATIENCE_US = 7_000_000
 _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
@@ -178,10 +181,17 @@ class Filter:
     def predict(self, samples: Array, row: int) -> None:
         predict(self.x, self.P, samples, row, self._packed_noise, self._gravity)
 
-    def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
-        """Fuse a fix measured `after_s` after the filter's time; return a reason if any part is rejected."""
+    def fuse_fix(
+        self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int, *, force_modelled: bool = False
+    ) -> Reason | None:
+        """Fuse a fix measured `after_s` after the filter's time; return a reason if any part is rejected.
+
+        If the force is modelled, a surprising velocity is followed: another force acts, as of the ground.
+        """
         x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
         z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
+        if self.magnetometer.misled:
+            self._doubt_attitude()
         claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
         if claims != self._claims:
             self._claims = claims
@@ -190,6 +200,8 @@ class Filter:
         ve, vn, vu, e, n, u = y.tolist()
         moves, lies, stands = self._fix_nis.tolist()
         accepted = True
+        if force_modelled and moves > _SURPRISE:
+            moves = self._follow(time_us, z[3:])
         if not self.velocity.note(time_us, (ve, vn, vu), moves):
             accepted &= self.velocity.force_accept(x, P, time_us, update.fuse_velocity, z[3:], variances[0])
         if not self.position.note(time_us, (e, n), lies):
@@ -197,6 +209,15 @@ class Filter:
         if not self.height.note(time_us, (u,), stands):
             accepted &= self.height.force_accept(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
         return None if accepted else Reason.INNOVATION
+
+    def _follow(self, time_us: int, velocity: Array) -> float:
+        """Fuse a velocity as the effect of an unknown force since the last accepted one; return its NIS."""
+        x, P = self.x, self.P
+        since_s = (time_us - self.velocity.accepted_us) * 1e-6
+        squared = square(float(np.abs(velocity - x[3:6]).max()))
+        update.inflate_covariance(P, VELOCITY, 3, squared)
+        update.inflate_covariance(P, ACCEL_BIAS, 3, squared / square(max(since_s, _SHORTEST_S)))
+        return update.fuse_velocity(x, P, velocity, self._fix_variances[0], inf, np.zeros(3))
 
     def reset_accel_bias(self, found: DetectedBias, time_us: int) -> None:
         """Correct the bias, and the position and velocity errors since its change."""
@@ -212,8 +233,11 @@ class Filter:
         self.accel_bias_us = time_us
 
     def replace_force(self, *, modelled: bool) -> None:
-        """Forget the bias of the accelerometer for that of the model, or the reverse."""
+        """Forget the bias of the accelerometer for that of the model, or the reverse, and what it led astray."""
         self._forget_bias(ACCEL_BIAS, _MODELLED_M_S2 if modelled else self._sensors.accelerometer.turn_on_bias_m_s2)
+        if modelled:
+            self._doubt_motion()
+            update.inflate_covariance(self.P, POSITION + 2, 1, square(self.barometer.kind.test.innovation[0]))
 
     def replace_rate(self, *, modelled: bool) -> None:
         """Forget the bias of the gyroscope for that of the model, or the reverse."""
@@ -231,12 +255,23 @@ class Filter:
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
-        speed_m_s = hypot(*self.velocity.test.innovation)
-        update.inflate_covariance(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
-        update.inflate_covariance(P, VELOCITY, 3, speed_m_s * speed_m_s)
+        self._doubt_motion()
         self.velocity.reset(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
+
+    def _doubt_attitude(self) -> None:
+        """Let GPS velocity find the attitude anew after a drift of the magnetometer."""
+        self.magnetometer.misled = False
+        update.inflate_covariance(self.P, ATTITUDE, 3, square(_MISLED_RAD))
+        update.inflate_covariance(self.P, GYRO_BIAS, 3, square(_MISLED_RAD_S))
+        self._doubt_motion()
+
+    def _doubt_motion(self) -> None:
+        """Inflate velocity and position by what GPS contradicts."""
+        speed_m_s = hypot(*self.velocity.test.innovation)
+        update.inflate_covariance(self.P, POSITION, 3, square(_UNSURE_S * speed_m_s))
+        update.inflate_covariance(self.P, VELOCITY, 3, speed_m_s * speed_m_s)
 
     def check(self, time_us: int) -> FilterCheck:
         upper = self.P.take(_UPPER).tolist()

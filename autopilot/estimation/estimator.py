@@ -270,11 +270,12 @@ class Estimator:
             return
         self._tests = None
         before = self.filter.x[:10].tolist()
-        reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
+        modelled = self._reading
+        place_enu_m = enu_of(fix.place, self._origin)
+        reason = self.filter.fuse_fix(fix, place_enu_m, after_s, now_us, force_modelled=modelled.force_modelled)
         if reason is not None:
             self._rejected.add(RejectedSource.GPS, reason)
         self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
-        modelled = self._reading
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
         if found is not None and not (modelled.force_modelled or modelled.rate_modelled):
             self.filter.reset_accel_bias(found, now_us)

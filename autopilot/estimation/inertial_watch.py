@@ -1,13 +1,18 @@
 """Failures of inertial sensors that show in their noise, in biases that grow, or against two other sensors."""
 
+from math import copysign, sqrt
+
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, roughness
 from colibri.autopilot.estimation.eskf import Filter
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.inertial import Inertial
 
 _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
 _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
+_MEAN_PART, _HIGH_SIGMAS = 0.2, 1.5  # filter gain of the mean innovation of pressures, and what contradicts
+_STEEP = 9.0  # σ² of the vertical part of a contradicted velocity
 
 
 class InertialWatch:
@@ -16,7 +21,8 @@ class InertialWatch:
     def __init__(self, inertial: Inertial) -> None:
         self._inertial = inertial
         self._rough = [0, 0]
-        self._bias_m_s2 = 0.0
+        self._bias_m_s2 = self._high = 0.0  # the mean innovation of the pressures, in σ
+        self._pressure_us = -1
 
     def look(self, buffer: DelayBuffer, filter_: Filter, now_us: int, *, rate_known: bool) -> None:
         """Check the waiting samples, and the tests of the filter; `rate_known`: the gyroscope is usable."""
@@ -28,11 +34,19 @@ class InertialWatch:
         if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
             inertial.gyroscope.failed = inertial.gyroscope.noisy = True
             inertial.gyroscope.value = buffer.mean_rate()
-        velocity, pressure = filter_.velocity, filter_.barometer.kind
-        if rate_known and velocity.rejected_us is not None and pressure.rejected_us is not None:
-            both_us = now_us - max(velocity.rejected_us, pressure.rejected_us)
-            alike = velocity.test.innovation[2] * pressure.test.innovation[0] > 0.0
-            inertial.accelerometer.failed |= alike and both_us > _BOTH_REJECTED_US
+        self._note_pressure(filter_.barometer.kind)
+        velocity = filter_.velocity
+        if rate_known and velocity.rejected_us is not None and abs(self._high) > _HIGH_SIGMAS:
+            east, north, up = velocity.test.innovation
+            steep = up * up * velocity.test.nis > _STEEP * (east * east + north * north + up * up)
+            long = now_us - velocity.rejected_us > _BOTH_REJECTED_US
+            inertial.accelerometer.failed |= long and steep and up * self._high > 0.0
+
+    def _note_pressure(self, kind: MeasurementKind) -> None:
+        test, before_us = kind.test, self._pressure_us
+        self._pressure_us = test.time_us
+        sigmas = copysign(sqrt(min(test.nis, test.gate)), test.innovation[0]) if test.time_us > before_us else 0.0
+        self._high += _MEAN_PART * (sigmas - self._high)
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""

@@ -13,8 +13,8 @@ _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
 _DRIFTING_FOR_US = 600_000
 CARRIED = 0.5  # thrust relative to weight below which a vehicle of unknown velocity falls or stands
-_MODEL_ERROR, _UNCARRIED_S = 0.2, 0.5
-"""Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 5 m/s faster."""
+_MODEL_ERROR, _UNCARRIED_S = 0.2, 1.0
+"""Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 10 m/s faster."""
 _UNCARRIED_STILL_S, _FALLS_M_S2 = 0.2, 4.0
 """The same where the climb rate falls by less than this per second of weight: in the air by more than 9."""
 _JUMP_M_S = 1.0  # change of the climb rate in a sample that no force causes: a corrected estimate, or the ground
@@ -25,6 +25,7 @@ HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its co
 KNOCK_SAMPLES = 6
 _KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0  # velocity change within so many samples, and acceleration, of a contact alone
 HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0  # missing height after a fall, and largest distance from the last standing place
+_PUSHED = 0.5  # moment of feet, in parts of a quarter of the weight at a rotor; in the air below 0.15
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
@@ -79,9 +80,9 @@ class Lack(NamedTuple):
         return Lack(lack_s, self.climb_m_s if self.lack_s and lack_s else climb_m_s, climb_m_s)
 
     def is_carried(self, climb_m_s: float) -> bool:
-        """Whether the ground carries the vehicle: it lacks lift for long, or for less long without falling faster."""
-        falls = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s
-        return self.lack_s >= (_UNCARRIED_S if falls else _UNCARRIED_STILL_S)
+        """Whether the ground carries the vehicle: it lacks lift for long, or less long and neither falls nor climbs."""
+        moves = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s or climb_m_s > _JUMP_M_S
+        return self.lack_s >= (_UNCARRIED_S if moves else _UNCARRIED_STILL_S)
 
 
 class Motion(NamedTuple):
@@ -141,6 +142,11 @@ def is_held_down(wanted_m: float, state: VehicleState, ground_m: float) -> bool:
     """Whether a vehicle stays at the ground though it should be well above."""
     z = state.position_enu_m[2]
     return z < wanted_m - HELD_DOWN_M and abs(z - ground_m) < NEAR_GROUND_M
+
+
+def is_touching(push: float, state: VehicleState, ground_m: float) -> bool:
+    """Whether a moment comes from feet on the ground, which must be near: a failed rotor pushes, too."""
+    return push > _PUSHED and abs(state.position_enu_m[2] - ground_m) < NEAR_GROUND_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:

@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Callable
-from math import hypot, inf
+from math import dist, hypot, inf
 from pathlib import Path
 from traceback import extract_tb
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.parameters.definitions import definitions
+from colibri.common.types import Vector
 from colibri.mavlink.hil import faults
 from colibri.mavlink.parameters.store import Parameter, ParamType, Value
 from colibri.plant.vehicle.description import load_vehicle
@@ -130,6 +131,8 @@ MAX_IMPACT_M_S = 4.0
 """The vehicle reports 3 m/s, by its estimate."""
 MAX_TILT_DEG = 75.0
 AIRBORNE_M, NEAR_GROUND_M, TOUCHING_M = 1.0, 0.15, 0.03
+GRAZE_S, GRAZE_M_S = 0.5, 2.0
+"""A contact from which the vehicle flies on in this time, changed by less, is no impact."""
 AFTER_S = 5.0
 LAND_WITHIN_S = 150.0
 
@@ -158,6 +161,7 @@ class _Flown:
         self._feed: Callable[[], object] = _nothing
         self._frames = 0
         self._impact = self._breach = ""
+        self._contact: tuple[float, Vector] | None = None
         self._limit_m: float | None = None  # of the distance from home, while outside the fence
         self._keeps_fence = False
         self._braking_m_s2 = self._reaction_s = 0.0
@@ -249,12 +253,17 @@ class _Flown:
         if self._frames % 4 == 0:
             self._feed()
         armed, before_m = flight.armed, flight.position[2]
-        speed_m_s, tilt_deg = flight.speed_m_s, flight.tilt_deg
+        velocity, speed_m_s, tilt_deg = flight.velocity, flight.speed_m_s, flight.tilt_deg
         self._plain_step()
         _, _, z = flight.position
         hits = before_m > TOUCHING_M >= z and speed_m_s > MAX_IMPACT_M_S
         if hits or (before_m > NEAR_GROUND_M >= z and tilt_deg > MAX_TILT_DEG):
             self._impact = f"impact at {speed_m_s:.1f} m/s, {tilt_deg:.0f} degrees, t = {flight.time_s:.2f} s"
+            self._contact = (flight.time_s, velocity) if tilt_deg <= MAX_TILT_DEG else None
+        elif self._contact and flight.time_s > self._contact[0] + GRAZE_S:
+            if z > NEAR_GROUND_M and dist(flight.velocity, self._contact[1]) < GRAZE_M_S:
+                self._impact = ""
+            self._contact = None
         if armed and not flight.armed and z > AIRBORNE_M:
             self._impact = f"rotors stopped at {z:.1f} m, t = {flight.time_s:.2f} s"
         if self._keeps_fence and not self._breach:

@@ -17,6 +17,7 @@ from colibri.autopilot.guidance.landing_detector import (
     is_clear,
     is_far_below,
     is_held_down,
+    is_touching,
     knock,
     watch,
 )
@@ -113,10 +114,12 @@ class GroundContact:
             self.land(now_us)
         return stands and fell
 
-    def watch_lift(self, now_us: int, lift: float, climb_m_s: float, interval_s: float) -> None:
+    def watch_forces(self, now_us: int, vehicle: VehicleState, lift: float, push: float, interval_s: float) -> None:
         """Detect ground without trust in the estimate, while the vehicle comes down."""
+        climb_m_s = vehicle.velocity_enu_m_s[2]
         self._lack = self._lack.after(lift, climb_m_s, interval_s)
-        if self._lack.is_carried(climb_m_s) and not self.standing:
+        touches = is_touching(push, vehicle, self.height_m)
+        if (touches or self._lack.is_carried(climb_m_s)) and not self.standing:
             self.land(now_us)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:

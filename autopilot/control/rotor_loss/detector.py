@@ -10,6 +10,7 @@ of the rotor's thrust below its recent mean. The ground and a failed gyroscope c
 Two coaxial rotors differ in their yaw moments alone: the alarm waits until one of them is `_CLEARLY` more likely.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ _WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way 
 _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
+_PUSH_PART, _MAX_PUSH = 0.25, 1.0  # filter gain and bound of a moment that the rotors do not cause
 _DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
 # Deviations of the residual by errors of the model, in parts of a quarter of the weight and its moments.
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
@@ -94,6 +96,7 @@ class DetectorState(NamedTuple):
     residual: Array  # force and moments, N and N m, (4,)
     noise: Array  # variances of the residual's changes, (4,)
     usual: Array  # mean of the residual force, N, (1,)
+    push: Array  # filtered residual moments about x and y, and their means, in parts of a quarter of the weight's, (4,)
 
 
 class RotorWatch:
@@ -104,7 +107,7 @@ class RotorWatch:
         self.lost: int | None = None  # index, permanently
         self.max_evidence = 0.0
         rotors = vehicle.rotors.count
-        self._memory = packed(DetectorState(*map(np.zeros, (rotors, 9, rotors, rotors, 4, 4, 1))))
+        self._memory = packed(DetectorState(*map(np.zeros, (rotors, 9, rotors, rotors, 4, 4, 1, 4))))
         self._kept = opened(self._memory, DetectorState)
         self.adopt(vehicle)
         stopped = vehicle.rotors.stopped
@@ -125,6 +128,12 @@ class RotorWatch:
         force, p, q, r = (matvec(self._accelerations, self._kept.speeds**2)).tolist()
         return force, p, q, r
 
+    @property
+    def push(self) -> float:
+        """Tilting moment that the rotors do not cause, as by feet on the ground: 1 for a quarter of the weight."""
+        x, y, *_ = self._kept.push.tolist()
+        return max(abs(x), abs(y)) if self.lost is None else 0.0
+
     def adopt(self, vehicle: Vehicle) -> None:
         self._battery = BatteryModel(vehicle)
         lag = rotor_lag(vehicle, self._interval_s)
@@ -137,6 +146,7 @@ class RotorWatch:
         kept = self._kept
         self.speeds = np.array(controls)
         kept.evidence[:] = kept.odds[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
+        kept.push[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: PerRotor, charge_ah: float, *, airborne: bool) -> int | None:
@@ -182,10 +192,12 @@ def _take_in(
     R = rotation_matrix(attitude)
     for i in range(3):
         kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
+    residual, expected, thrust_n = _residual(kept, before, speeds_before, known.signature, known.interval_s)
+    _feel_push(kept.push, residual, known.signature.variances)
     if not counts:
         kept.evidence[:] = kept.odds[:] = kept.usual[:] = 0.0
         return 0, 0.0
-    return _add_evidence(kept, before, speeds_before, known.signature, known.interval_s)
+    return _add_evidence(kept, residual, expected, thrust_n, known.signature)
 
 
 @compiled
@@ -198,11 +210,11 @@ def _followed(speeds: Array, controls: PerRotor, open_v: float, lag: SampledLag,
 
 
 @compiled
-def _add_evidence(
+def _residual(
     memory: DetectorState, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
-) -> tuple[int, float]:
-    """Add a sample to the CUSUMs in place; return the likeliest rotor, and its value, below `ALARM` while in doubt."""
-    evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
+) -> tuple[Array, Array, Array]:
+    """Return force and moments beyond those of the rotors, those of the rotors, and the thrust of each."""
+    now, speeds = memory.motion, memory.speeds
     rotor_count = len(rotors.momentum)
     thrust_n = np.empty(rotor_count)
     h, h_rate = 0.0, 0.0
@@ -225,6 +237,24 @@ def _add_evidence(
         for i in range(rotor_count):
             expected[row] += rotors.effect[row, i] * thrust_n[i]
         residual[row] -= expected[row]
+    return residual, expected, thrust_n
+
+
+@compiled
+def _feel_push(push: Array, residual: Array, variances: Array) -> None:
+    for i in range(2):
+        part = _TILT_PART * residual[1 + i] / sqrt(variances[1 + i])
+        push[i] += _PUSH_PART * (min(max(part - push[2 + i], -_MAX_PUSH), _MAX_PUSH) - push[i])
+        push[2 + i] += _USUAL_PART * min(max(part - push[2 + i], -_TILT_PART), _TILT_PART)
+
+
+@compiled
+def _add_evidence(
+    memory: DetectorState, residual: Array, expected: Array, thrust_n: Array, rotors: Signature
+) -> tuple[int, float]:
+    """Add a sample to the CUSUMs in place; return the likeliest rotor, and its value, below `ALARM` while in doubt."""
+    evidence, last, noise, rotor_count = memory.evidence, memory.residual, memory.noise, len(rotors.momentum)
+    for row in range(4):
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
         last[row] = residual[row]

@@ -51,6 +51,7 @@ class MagnetometerFusion(FusedInstrument):
         self._mean: Vector = (0.0, 0.0, 0.0)  # of the innovations, gauss
         self._mean_us = 0
         self.doubt_from_us = 0
+        self.misled = False  # whether the attitude has followed a drift
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return the field, gauss FLU."""
@@ -65,6 +66,7 @@ class MagnetometerFusion(FusedInstrument):
         part = min((time_us - self._mean_us) * 1e-6 / _MEAN_S, 1.0)
         self._mean_us = time_us
         drifts = self._drifts(x, P, value, part)
+        self.misled |= drifts and self.kind.rejected_us is None
         if (drifts or not is_of_earth) and not self.kind.reject(time_us):
             return Reason.FIELD
         resets = self.kind.resets

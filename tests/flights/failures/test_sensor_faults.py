@@ -16,6 +16,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tests.support.failed_sensors import Fault, flown_on, matrix, singles
 from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
+from tools.random_flights.flights import case_of, fly
 
 pytestmark = QUICK
 
@@ -113,6 +114,21 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
     sitl.wait_until(lambda: sitl.said("Landing detected"), within=3.0)
     sitl.wait_until(lambda: not sitl.armed, within=3.0)
     assert sitl.tilt_deg < 5.0
+
+
+@pytest.mark.sitl(feedback="sensors", vehicle="iris", wind="9@39", strict=False)
+def test_feet_on_the_ground_end_a_landing(sitl: Sitl) -> None:
+    sitl.takeoff(2.0)
+    sitl.inject("accel", "off")
+    sitl.wait_until(lambda: sitl.position[2] < 0.03, within=10.0)
+    sitl.wait_until(lambda: sitl.said("Landing detected"), within=0.5)
+    sitl.hold(lambda: sitl.tilt_deg < 25.0, for_=1.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [133, 351, 376, 418])
+def test_slow_drifts_and_winds_end_in_landings(seed: int) -> None:
+    assert not fly(case_of(seed)).violated
 
 
 @pytest.mark.parametrize(
