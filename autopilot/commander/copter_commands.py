@@ -10,6 +10,7 @@ from colibri.autopilot.commander.commands import FORCE_MAGIC, Commanded, Command
 from colibri.autopilot.commander.copter_motion import ALT_HOLD, AUTO, CIRCLE, LOITER, POSHOLD, CopterMotion
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
 from colibri.autopilot.guidance.tasks.guided import GuidedSettings
 from colibri.mavlink.parameters.store import ParamError
 from colibri.mavlink.services.command import DENIED, FAILED, Handler, ReceivedCommand
@@ -17,7 +18,7 @@ from colibri.mavlink.services.statustext import CRITICAL, INFO
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
-DO_AUX_FUNCTION, DO_SEND_BANNER = 218, 42428
+DO_SEND_BANNER = 42428
 """Of the dialect ardupilotmega."""
 _BY_THRUST, _YAW_STAYS = 8, 0
 _MAX_SPIN = 0.3

@@ -9,7 +9,14 @@ from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.mission.executor import Circling, MissionEvent, MissionExecutor, MissionRecord, Reached
+from colibri.autopilot.guidance.mission.executor import (
+    AuxFunction,
+    Circling,
+    MissionEvent,
+    MissionExecutor,
+    MissionRecord,
+    Reached,
+)
 from colibri.autopilot.guidance.mission.items import places, rally_places
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
@@ -40,6 +47,8 @@ class Missions:
     Attributes:
         unmet: Unmet needs of mode mission, with reasons.
         checking: Whether `check_on` is due, as a long mission takes several frames.
+        boot_unix_us: Unix time at simulated time 0, if items may name a time of day; else 0.
+        functions: Functions of items, to carry out and remove.
     """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
@@ -55,6 +64,8 @@ class Missions:
         self._found: list[tuple[int, Vector]] = []
         self._checked = 0
         self._reached: list[int] = []
+        self.boot_unix_us = 0
+        self.functions: list[AuxFunction] = []
         self.changes = 0
 
     @property
@@ -152,6 +163,8 @@ class Missions:
             self._reached.append(event.seq)
         elif isinstance(event, Circling):
             self._lines.say(WARNING, f"item {event.seq} of the mission: endless jumps: cannot be flown")
+        elif isinstance(event, AuxFunction):
+            self.functions.append(event)
         else:
             self.move_home(event.position_enu_m or state.position_enu_m, state.euler[2], state)
 
@@ -174,6 +187,7 @@ class Missions:
             turns,
             context.home_enu_m,
             self._home.origin,
+            self.boot_unix_us and self.boot_unix_us + context.now_us,
         )
 
     def check_on(self) -> None:

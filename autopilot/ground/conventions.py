@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from colibri.autopilot.commander.commands import Commands
+from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import ModeSelection
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
@@ -12,7 +13,10 @@ from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import ULOG, LogFormat
 from colibri.autopilot.ground.system_commands import SystemCommands
+from colibri.autopilot.guidance.mission.items import MISSION_RULES
 from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.mission.service import MissionService
+from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Service
 from colibri.mavlink.parameters.store import Parameter, Parameters, Value
 from colibri.mavlink.services.identity import Identity
@@ -34,6 +38,8 @@ class Served(Protocol):
     failures: Failures
     pilot: Pilot
     banner: tuple[str, ...]
+    missions: Missions
+    plans: MissionService
 
     @property
     def takeoff_by_stick(self) -> Callable[[float], None]: ...
@@ -60,6 +66,7 @@ class Conventions:
     commands: type[Commands] = Commands
     frames: dict[int, Frame] | None = None
     streams: Streams = PX4_STREAMS
+    mission_rules: Rules = MISSION_RULES
     radio: tuple[int, ...] = ()  # channels without overrides, us; empty: sticks come by MAVLink alone
     parameters: Callable[[Iterable[Parameter], int], Parameters] = lambda ours, _: Parameters(ours)
     folder_suffix: str = ""  # ending of the parameter file's name
@@ -69,4 +76,5 @@ class Conventions:
     rewrite: Rewrite = str
     banner: tuple[str, ...] = ()  # status texts at the start, after Colibri's own
     describe: Callable[[int, MissionItem, bool], str] | None = None  # text of a mission item that begins or is reached
+    loaded: Callable[[Parameters, int, int], None] = lambda *_: None  # of a plan's type, with its number of items
     services: Callable[[Served], Sequence[Service]] = lambda _: ()

@@ -18,7 +18,7 @@ from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, LoggedVehicle, OnboardLog
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
-from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
+from colibri.autopilot.guidance.mission.items import RALLY_RULES
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.log_download import Logs
@@ -26,7 +26,7 @@ from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.files.tree import Files, Tree
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
-from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, StoredPlan
 from colibri.mavlink.mission.service import MissionService, MissionVehicle
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.hub import ChannelObserver, Hub, Outgoing
@@ -54,7 +54,6 @@ from colibri.mavlink.wire.signing import Signing
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 MAX_SAID = 20
 """Status texts kept for the terminal."""
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
@@ -135,11 +134,13 @@ class Stations:
         commands = conventions.commands(parts)
         self.modes, self.offboard.taken = commands.modes, commands.taken
         self.exempt, self.takeoff_by_stick = commands.exempt, commands.motion.takeoff_by_stick
-        vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
+        rules = {MISSION: conventions.mission_rules, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
+        vehicle = MissionVehicle(self._load, missions.progress, missions.set_current, commands.motion.guided_goto)
         if wire.home_first:
+            missions.boot_unix_us = settings.boot_unix_us
             vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
         self.plans = MissionService(
-            PLAN_RULES, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
+            rules, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
         )
         self._heartbeat = HeartbeatService(wire)
         encoders = streams.chosen(telemetry(settings.boot_unix_us))
@@ -186,6 +187,10 @@ class Stations:
         program = self.banner[0] if self.banner else ""
         logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, program, settings.boot_unix_us)
         self.log = OnboardLog(logged, files, logs)
+
+    def _load(self, plan_type: int, plan: StoredPlan) -> None:
+        self.missions.load(plan_type, plan)
+        self._conventions.loaded(self.parameters, plan_type, len(plan.items))
 
     def use(self, channel: int, kind: str) -> None:
         self.streams.use(channel, kind)

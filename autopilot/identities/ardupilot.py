@@ -11,7 +11,8 @@ from colibri.autopilot.commander.rules.modes import Mode, Need, State
 from colibri.autopilot.commander.rules.shown_modes import CUSTOM, STABILIZED, BaseModes, ModeBook, ShownMode
 from colibri.autopilot.ground.conventions import Conventions
 from colibri.autopilot.ground.onboard_log import DATAFLASH
-from colibri.autopilot.identities.copter_parameters import booted, copter_parameters
+from colibri.autopilot.guidance.mission.items import COPTER_RULES
+from colibri.autopilot.identities.copter_parameters import booted, copter_parameters, count_items
 from colibri.autopilot.identities.copter_services import copter_services
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Parameters
@@ -234,6 +235,8 @@ CONVENTIONS = Conventions(
     logs=DATAFLASH,
     booted=booted,
     kept_plans=_kept_plans,
+    mission_rules=COPTER_RULES,
+    loaded=count_items,
     rewrite=_rewrite,
     banner=_BANNER,
     describe=_describe,

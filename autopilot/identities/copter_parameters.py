@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
 from colibri.mavlink.parameters.numbers import Number, read_numbers
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, Value, float32
 from colibri.mavlink.wire.dialect import mav
@@ -22,6 +23,8 @@ _DISTANCES = (("GF_MAX_VER_DIST", "FENCE_ALT_MAX", _ALT_MAX), ("GF_MAX_HOR_DIST"
 _OUR_FENCE = ("GF_MAX_VER_DIST", "GF_MAX_HOR_DIST", "GF_ACTION")
 _LINK_ACTIONS = {0: 0, 1: 2, 2: 2, 3: 2, 4: 2, 5: 3, 6: 2, 7: 1}
 """NAV_DLL_ACT and NAV_RCL_ACT by FS_GCS_ENABLE and FS_THR_ENABLE, whose 3 is LAND."""
+_TOTALS = {MISSION: ("MIS_TOTAL", 1), FENCE: ("FENCE_TOTAL", 0), RALLY: ("RALLY_TOTAL", 0)}
+_MAX_TOTALS = {MISSION: 32_767, FENCE: 127, RALLY: 127}
 _LINK_ACTIONS_BACK = {0: 0, 1: 7, 2: 1, 3: 5, 5: 5}
 _OURS_FROM_THE_START: Mapping[str, Value] = {"MPC_XY_VEL_MAX": 25.0, "COM_DISARM_LAND": 1.0, "RTL_MIN_DIST": 0.0} | {
     name: 0.0 for name in ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
@@ -50,7 +53,14 @@ def copter_parameters(ours: Iterable[Parameter], system_id: int) -> Parameters:
 def booted(values: dict[str, Value]) -> dict[str, Value]:
     """Return saved values with one start more."""
     starts = values.get("STAT_BOOTCNT", 0) if values.get("STAT_RESET", 1) else 0
-    return {**values, "STAT_BOOTCNT": int(starts) % 32_767 + 1, "STAT_RESET": 1}
+    totals = {name: 0 for name, _ in _TOTALS.values()}
+    return {**values, **totals, "STAT_BOOTCNT": int(starts) % 32_767 + 1, "STAT_RESET": 1}
+
+
+def count_items(parameters: Parameters, plan_type: int, items: int) -> None:
+    """Report the size of a plan, with home."""
+    name, homes = _TOTALS[plan_type]
+    parameters.set(name, min(items + homes, _MAX_TOTALS[plan_type]) if items else 0)
 
 
 class ParameterLinks:

@@ -4,12 +4,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from math import radians
 
+from colibri.autopilot.commander.copter_motion import AUTO
 from colibri.autopilot.ground.conventions import Served
-from colibri.common.earth.geodesy import Geodetic
+from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.kernels import cos
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG, Fault
 from colibri.mavlink.hil.world_changes import PaceChange, WindChange, WorldChange
+from colibri.mavlink.mission.items import MISSION, MissionItem
 from colibri.mavlink.node.service import Peer, Send, Service, to
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import ReceivedCommand
@@ -20,7 +23,7 @@ from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
-_USING_GPS = ("EKF3 IMU0 origin set", "EKF3 IMU0 is using GPS")
+_USING_GPS = ("AHRS: EKF3 active", "EKF3 IMU0 origin set", "EKF3 IMU0 is using GPS")
 _PREARM_EVERY_US = 30_000_000
 _SWITCHES_US = (1230, 1360, 1490, 1620, 1749)
 """Upper ends of the first five positions of the mode switch."""
@@ -31,6 +34,8 @@ _ARMS, _DISARMS = 1, 2
 _MODE_OPTIONS = {4: 6, 16: 3, 18: 9, 33: 17, 52: 1, 55: 4, 56: 5, 57: 23, 68: 0, 69: 16, 70: 2, 72: 7}
 """Mode number by RCn_OPTION."""
 _FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
+_SAVES_WAYPOINT, _RESETS_MISSION, _CLEARS_MISSION = 7, 24, 58
+_LOW, _MIDDLE, _HIGH = _LEVELS = (0, 1, 2)
 _M_PER_DEG = 111_319.5
 _PLACES: Mapping[str, Encoder] = {"HOME_POSITION": home_position, "GPS_GLOBAL_ORIGIN": gps_global_origin}
 _STREAMS = {
@@ -205,7 +210,9 @@ class PreArm(Polled):
 
 
 class Switches(Polled):
-    """Selects modes by switches, and arms by the yaw stick."""
+    """Carries out the functions of switches, of commands and mission items instead of them, and of the yaw stick."""
+
+    handles = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
     def __init__(self, served: Served) -> None:
         super().__init__(served)
@@ -214,8 +221,17 @@ class Switches(Polled):
         self._high: dict[int, bool] = {}
         self._stick, self._since_us = 0, 0
 
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        del peer, now_us
+        fields = message.fields
+        if fields.command == DO_AUX_FUNCTION and fields.param2 in _LEVELS:
+            self._act(int(fields.param1), int(fields.param2))
+        return ()
+
     def poll(self, now_us: int) -> Iterable[Send]:
-        snapshot = self._served.snapshot
+        snapshot, functions = self._served.snapshot, self._served.missions.functions
+        while functions:
+            self._act(*functions.pop(0))
         if snapshot is None or not snapshot.channels:
             return ()
         channels = snapshot.channels
@@ -253,14 +269,39 @@ class Switches(Polled):
         before, self._high[number] = self._high.get(number), high
         if before is None and not high:
             return
-        mode = _MODE_OPTIONS.get(option)
-        if mode is not None:
+        self._act(option, _HIGH if high else _LOW)
+
+    def _act(self, option: int, level: int) -> None:
+        """Carry out a function: RC_Channel.cpp."""
+        served, high, mode = self._served, level == _HIGH, _MODE_OPTIONS.get(option)
+        if mode is not None and level != _MIDDLE:
             position = self._position or 0
-            self._select(mode if high else int(self._served.parameters[f"FLTMODE{position + 1}"]))
+            self._select(mode if high else int(served.parameters[f"FLTMODE{position + 1}"]))
         elif option == _FENCE_OPTION:
-            self._served.parameters.propose("FENCE_ENABLE", int(high))
-        elif option in _ARM_OPTIONS:
+            served.parameters.propose("FENCE_ENABLE", int(high))
+        elif option in _ARM_OPTIONS and level != _MIDDLE:
             self._arm(high)
+        elif option == _CLEARS_MISSION and high:
+            served.plans.load(MISSION, ())
+        elif option == _RESETS_MISSION and high:
+            served.plans.choose(0)
+        elif option == _SAVES_WAYPOINT and high:
+            self._save_waypoint()
+
+    def _save_waypoint(self) -> None:
+        """Append the place to the mission: a take-off first, and a landing without throttle."""
+        served, snapshot = self._served, self._served.snapshot
+        throttle = self._channels[_THROTTLE] > _DOWN_US if self._channels else False
+        items = served.plans.plans[MISSION].items
+        if snapshot is None or not snapshot.armed or snapshot.custom_mode == AUTO or not (items or throttle):
+            return
+        place = geodetic_of(snapshot.position_enu_m, snapshot.origin)
+        height_m = snapshot.position_enu_m[2] - served.pilot.home.position_enu_m[2]
+        x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+        command = mav.MAV_CMD_NAV_WAYPOINT if throttle else mav.MAV_CMD_NAV_LAND
+        up = _item(mav.MAV_CMD_NAV_TAKEOFF, 0, 0, max(height_m, 1.0))
+        served.plans.load(MISSION, [*(items or (up,)), _item(command, x, y, height_m)])
+        served.say(INFO, "Saved waypoint")
 
     def _arm(self, arms: bool) -> None:
         refusal = self._served.modes.arm(force=False) if arms else self._served.pilot.disarm()
@@ -280,6 +321,10 @@ class Switches(Polled):
                 self._arm(True)
             elif stick < 0 and armed and allowed >= _DISARMS:
                 self._served.pilot.disarm(force=manual)
+
+
+def _item(command: int, x: int, y: int, height_m: float) -> MissionItem:
+    return MissionItem(mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, command, 1, 0.0, 0.0, 0.0, 0.0, x, y, height_m)
 
 
 class SimulatedWorld(Polled):

@@ -115,6 +115,7 @@ class MissionService:
         self._downloads = Downloads()
         self._outbox: list[Send] = []
         self._shown: MissionProgress | None = None
+        self._chosen = 0
         self._stream_us = self._due_us = 0
         self._receivers: dict[str, Receiver] = {
             "MISSION_COUNT": self._count,
@@ -168,10 +169,10 @@ class MissionService:
         self._outbox += self._text.say(INFO, text) if text else ()
 
     def _seq(self) -> int:
-        """Return the current item as clients count; 0 until a mission with home has begun."""
+        """Return the current item as clients count; 0 until a mission with home has begun, or its first was chosen."""
         progress = self._progress()
         begun = progress.state not in (mav.MISSION_STATE_NO_MISSION, mav.MISSION_STATE_NOT_STARTED)
-        return progress.seq + self._offset if begun or progress.seq else 0
+        return progress.seq + self._offset if begun or progress.seq else self._chosen
 
     def current(self) -> Fields:
         progress = self._progress()
@@ -188,6 +189,7 @@ class MissionService:
 
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
         self.plans[plan_type] = plan = plan_of(items)
+        self._chosen = self._chosen if plan_type != MISSION else 0
         self._vehicle.load(plan_type, plan)
         self._announce()
         return plan
@@ -206,11 +208,18 @@ class MissionService:
             return Refusal(f"mission: reset {reset:g} is not 0 or 1")
         if self._offset and seq < 0.0:
             return Refusal(f"mission: item {seq:g} is not 0 or more")
-        refusal = self._vehicle.set_current(self._inside(int(seq)), reset == 1.0)
+        refusal = self.choose(int(seq), reset == 1.0)
         if refusal is not None and self._offset:
             return refusal._replace(result=DENIED)
         if refusal is None:
             self._announce()
+        return refusal
+
+    def choose(self, seq: int, reset: bool = False) -> Refusal | None:
+        """Go to an item, as clients count."""
+        refusal = self._vehicle.set_current(self._inside(seq), reset)
+        if refusal is None and self._offset:
+            self._chosen = min(seq, self._offset)
         return refusal
 
     def _announce(self) -> None:
@@ -297,7 +306,7 @@ class MissionService:
         return [ack(peer, ACCEPTED, plan_type)]
 
     def _set_current(self, fields: Any, _peer: Peer, _now_us: int) -> Iterable[Send]:
-        refusal = self._vehicle.set_current(self._inside(fields.seq), False)
+        refusal = self.choose(fields.seq)
         if refusal is not None:
             return self._text.say(WARNING, refusal.reason)
         self._announce()

@@ -4,13 +4,22 @@ from math import atan2, cos, dist, nan, sin, tau
 
 from hypothesis import strategies as st
 
-from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, Circling, MissionExecutor, Reached, SetHome
+from colibri.autopilot.guidance.mission.executor import (
+    ACTIVE,
+    COMPLETE,
+    AuxFunction,
+    Circling,
+    MissionExecutor,
+    Reached,
+    SetHome,
+)
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import mav
 
@@ -33,8 +42,8 @@ def item(
 class Flight:
     """A vehicle that moves at 5 m/s, or as fast as it is told, and a navigator that judges when it arrived."""
 
-    def __init__(self, *items: MissionItem, flying: bool = True) -> None:
-        assert all(MISSION_RULES.check_item(each) == ACCEPTED for each in items)
+    def __init__(self, *items: MissionItem, flying: bool = True, rules: Rules = MISSION_RULES) -> None:
+        assert all(rules.check_item(each) == ACCEPTED for each in items)
         self.mission = MissionExecutor(items, Defaults(acceptance_m=0.5, takeoff_height_m=2.5, orbit_radius_m=10.0))
         self.position: Vector = (HOME[0], HOME[1], HOME[2] + (5.0 if flying else 0.0))
         self.landed = not flying
@@ -46,6 +55,7 @@ class Flight:
         self.orders: list[Order] = []
         self.reached: list[int] = []
         self.circling: list[int] = []
+        self.functions: list[AuxFunction] = []
         self.homes: list[Vector | None] = []
         self.speeds: list[float] = []
 
@@ -63,6 +73,7 @@ class Flight:
         assert step.flying == (self.mission.progress.state == ACTIVE)
         self.reached += [event.seq for event in step.events if isinstance(event, Reached)]
         self.circling += [event.seq for event in step.events if isinstance(event, Circling)]
+        self.functions += [event for event in step.events if isinstance(event, AuxFunction)]
         self.homes += [event.position_enu_m for event in step.events if isinstance(event, SetHome)]
         if not self.orders or self.orders[-1] is not step.order:
             self.orders.append(step.order)

@@ -11,8 +11,9 @@ from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.places import MAX_DISTANCE_M, height_m, misplaced, misplaced_height
+from colibri.mavlink.wire.places import MAX_DISTANCE_M, MAX_HEIGHT_M, height_m, misplaced
 
+DO_AUX_FUNCTION = 218  # of the dialect ardupilotmega
 _PAYLOAD = (
     "NAV_ROI CONDITION_DISTANCE DO_SET_RELAY DO_REPEAT_RELAY DO_SET_SERVO DO_REPEAT_SERVO DO_SET_ACTUATOR "
     "DO_RETURN_PATH_START DO_LAND_START DO_SET_ROI_LOCATION DO_SET_ROI_WPNEXT_OFFSET DO_SET_ROI_NONE "
@@ -76,10 +77,22 @@ _ALLOWED: Mapping[int, _Allowed] = {
     mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),
 }
 FLOWN: frozenset[int] = frozenset(_ALLOWED)
+_COPTERS: Mapping[int, _Allowed] = {
+    **{command: allowed._replace(here=allowed.place) for command, allowed in _ALLOWED.items()},
+    mav.MAV_CMD_NAV_SPLINE_WAYPOINT: _Allowed(True, True, here=True),
+    mav.MAV_CMD_NAV_DELAY: _Allowed(p1=isfinite),
+    DO_AUX_FUNCTION: _Allowed(p1=_whole(0, 0xFFFF), p2=_one_of(0.0, 1.0, 2.0)),
+}
+_COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h
 
 
-def check_item(item: MissionItem) -> int:
-    allowed = _ALLOWED.get(item.command)
+def check_copter_item(item: MissionItem) -> int:
+    """Check an item as ArduCopter: a place of 0, 0 is where the vehicle is going."""
+    return check_item(item, _COPTERS, _COPTERS_MAX_HEIGHT_M)
+
+
+def check_item(item: MissionItem, table: Mapping[int, _Allowed] = _ALLOWED, max_height_m: float = MAX_HEIGHT_M) -> int:
+    allowed = table.get(item.command)
     if allowed is None:
         return int(ACCEPTED if item.command in SKIPPED else mav.MAV_MISSION_UNSUPPORTED)
     if item.command == mav.MAV_CMD_DO_SET_HOME and item.p1 != 1.0:
@@ -96,7 +109,7 @@ def check_item(item: MissionItem) -> int:
         result = check_place(item)
         if result != ACCEPTED:
             return result
-    return check_height(item) if allowed.height else ACCEPTED
+    return check_height(item, max_height_m) if allowed.height else ACCEPTED
 
 
 def check_mission(items: Sequence[MissionItem]) -> tuple[int, int]:
@@ -121,8 +134,8 @@ def check_place(item: MissionItem) -> int:
     return int(mav.MAV_MISSION_INVALID_PARAM6_Y if on_earth else mav.MAV_MISSION_INVALID_PARAM5_X)
 
 
-def check_height(item: MissionItem) -> int:
-    return int(mav.MAV_MISSION_INVALID_PARAM7 if misplaced_height(item.z) else ACCEPTED)
+def check_height(item: MissionItem, max_m: float = MAX_HEIGHT_M) -> int:
+    return int(ACCEPTED if abs(item.z) <= max_m else mav.MAV_MISSION_INVALID_PARAM7)
 
 
 def is_here(item: MissionItem) -> bool:
@@ -145,12 +158,12 @@ def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
 def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
     """Yield sequence number and place, m, ENU, of destinations."""
     for seq, item in enumerate(items):
-        allowed = _ALLOWED.get(item.command)
+        allowed = _COPTERS.get(item.command)
         if allowed is None or not (allowed.place or (item.command == mav.MAV_CMD_DO_SET_HOME and item.p1 != 1.0)):
             continue
-        if not (allowed.here and is_here(item)):
+        if not is_here(item):
             yield seq, place_of(item, home_enu_m, origin)
-        elif allowed.height:
+        elif allowed.height and (item.z or item.command == mav.MAV_CMD_NAV_TAKEOFF):
             yield seq, (home_enu_m[0], home_enu_m[1], height_of(item, home_enu_m, origin))
 
 
@@ -159,4 +172,5 @@ def rally_places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geode
 
 
 MISSION_RULES = Rules(check_item, check_mission)
+COPTER_RULES = Rules(check_copter_item, check_mission)
 RALLY_RULES = Rules(check_rally_item, lambda _: (ACCEPTED, 0))

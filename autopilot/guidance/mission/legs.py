@@ -27,6 +27,7 @@ class MissionContext(NamedTuple):
     turns: float
     home_enu_m: Vector
     origin: Geodetic
+    unix_us: int = 0  # time, if items may name it
 
 
 class Defaults(NamedTuple):
@@ -47,7 +48,12 @@ class ItemContext(NamedTuple):
     speed_m_s: float | None
 
     def place(self, item: MissionItem) -> Vector:
-        return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
+        """Return the place of an item; 0, 0 is where the vehicle is going, and a height of 0 with it its height."""
+        now, order = self.mission_context, self.order
+        if not is_here(item):
+            return place_of(item, now.home_enu_m, now.origin)
+        x, y, z = order.position_enu_m if isinstance(order, GoTo) else now.position_enu_m
+        return (x, y, height_of(item, now.home_enu_m, now.origin) if item.z else z)
 
     def yaw(self, item: MissionItem) -> float | None:
         """Return the heading of an item, rad; None is along its way."""
@@ -120,8 +126,18 @@ def _land(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     return (LegPhase(Land(place, context.yaw(item)), _landed, reaches=True),)
 
 
-def _delay(item: MissionItem, _context: ItemContext) -> tuple[LegPhase, ...]:
-    return (LegPhase(None, _after(_or_zero(item.p1)), reaches=True),)
+def _delay(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
+    unix_us = context.mission_context.unix_us
+    absolute = unix_us and item.command == mav.MAV_CMD_NAV_DELAY and not item.p1 > 0.0
+    wait_s = _until(item, unix_us * 1e-6) if absolute else _or_zero(item.p1)
+    return (LegPhase(None, _after(wait_s), reaches=True),)
+
+
+def _until(item: MissionItem, unix_s: float) -> float:
+    """Return the time until UTC is p2 hours, p3 minutes, p4 seconds, s; -1 is any."""
+    hours, minutes, seconds = item.p2, item.p3, item.p4
+    period_s = 86_400.0 if hours >= 0.0 else 3600.0 if minutes >= 0.0 else 60.0
+    return (max(hours, 0.0) * 3600.0 + max(minutes, 0.0) * 60.0 + max(seconds, 0.0) - unix_s) % period_s
 
 
 def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
@@ -144,6 +160,7 @@ def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 _LEGS: Mapping[int, Leg] = {
     mav.MAV_CMD_NAV_WAYPOINT: _waypoint,
+    mav.MAV_CMD_NAV_SPLINE_WAYPOINT: _waypoint,
     mav.MAV_CMD_NAV_LOITER_UNLIM: lambda item, context: _there(item, context, inf),
     mav.MAV_CMD_NAV_LOITER_TIME: lambda item, context: _there(item, context, _or_zero(item.p1)),
     mav.MAV_CMD_NAV_LOITER_TURNS: _circle,

@@ -19,6 +19,7 @@ from tests.autopilot.identities.copter_words import heading, near_angle
 ARDUPILOT = conventions_of("ardupilot")
 AS_ARDUPILOT = pytest.mark.sitl(identity="ardupilot")
 ACCEPTED, DENIED, FAILED = mav.MAV_RESULT_ACCEPTED, mav.MAV_RESULT_DENIED, mav.MAV_RESULT_FAILED
+DO_AUX_FUNCTION, CLEARS_MISSION, HIGH = 218, 58.0, 2.0
 GLOBAL, RELATIVE = mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
@@ -159,6 +160,18 @@ def test_item_0_is_home_and_a_part_is_replaced(sitl: Sitl) -> None:
     home, way = sitl.gcs.heard["MISSION_ITEM"]
     assert (home.x, way.x, way.y, way.z) == pytest.approx((home.x, 47.397742, 8.545594, 7.0), abs=1e-5)
     assert home.x == pytest.approx(47.397742, abs=1e-5)
+
+
+@AS_ARDUPILOT
+def test_missions_are_counted_chosen_and_cleared(sitl: Sitl) -> None:
+    sitl.upload_mission([items.takeoff(10.0), items.waypoint(5.0, 0.0, 10.0)])
+    assert sitl.get_param("MIS_TOTAL") == 3
+    assert sitl.command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 1.0) == ACCEPTED
+    sitl.command(mav.MAV_CMD_REQUEST_MESSAGE, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
+    assert sitl.gcs.latest("MISSION_CURRENT").seq == 1
+    assert sitl.command(DO_AUX_FUNCTION, CLEARS_MISSION, HIGH) == ACCEPTED
+    sitl.run(0.1)
+    assert sitl.get_param("MIS_TOTAL") == 0
 
 
 @AS_ARDUPILOT

@@ -15,8 +15,8 @@ from colibri.autopilot.guidance.mission.executor import (
     MissionExecutor,
     Reached,
 )
-from colibri.autopilot.guidance.mission.items import MISSION_RULES
-from colibri.autopilot.guidance.mission.legs import MissionContext
+from colibri.autopilot.guidance.mission.items import COPTER_RULES, MISSION_RULES
+from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, MissionContext, phases_of
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Orbit, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
@@ -26,6 +26,7 @@ from colibri.mavlink.wire.refusal import Refusal
 from tests.support.mission_flight import HOME, ITEMS, STEP_US, Flight, begun, from_home, item
 
 MINUTE_S = 60.0
+AT_NOON = MissionContext(HOME, (0.0, 0.0, 0.0), 0.0, False, False, 0.0, HOME, DEFAULT_ORIGIN, 43_200_000_000)
 
 
 def test_a_whole_mission_from_the_ground_and_back() -> None:
@@ -53,6 +54,33 @@ def test_a_whole_mission_from_the_ground_and_back() -> None:
     assert first.yaw_rad == pytest.approx(0.0)
     assert isinstance(second, GoTo)
     assert second.yaw_rad is None
+
+
+def test_items_of_arducopter_at_0_0_are_where_it_is_going() -> None:
+    flight = Flight(
+        item("NAV_WAYPOINT", (30.0, 0.0, 10.0)),
+        item("NAV_LOITER_TIME", p1=1.0)._replace(frame=3),
+        item("NAV_SPLINE_WAYPOINT")._replace(frame=3, z=14.0),
+        MissionItem(2, 218, 1, 70.0, 2.0, nan, nan, 0, 0, 0.0),
+        rules=COPTER_RULES,
+    )
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert (flight.functions, flight.mission.progress.state) == ([(70, 2)], COMPLETE)
+    assert from_home(flight) == pytest.approx((30.0, 0.0, 14.0), abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "wait_s"),
+    [((4.0, 0, 0, 0), 4.0), ((0, 12, 0, 10), 10.0), ((-1.0, 11, 59, 59), 86_399.0), ((0, -1, 1, 5), 65.0)],
+)
+def test_delays_of_arducopter_may_end_at_a_time(numbers: tuple[float, ...], wait_s: float) -> None:
+    (leg,) = phases_of(
+        item("NAV_DELAY")._replace(**dict(zip(("p1", "p2", "p3", "p4"), numbers, strict=True))),
+        ItemContext(AT_NOON, Defaults(), Hold(), None),
+    )
+    assert not leg.ends(AT_NOON, wait_s - 0.01)
+    assert leg.ends(AT_NOON, wait_s + 0.01)
 
 
 def test_a_mission_that_begins_with_a_waypoint_takes_off_first() -> None:
