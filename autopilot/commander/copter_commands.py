@@ -20,7 +20,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 DO_SEND_BANNER = 42428
 """Of the dialect ardupilotmega."""
-_BY_THRUST, _YAW_STAYS = 8, 0
+_BY_THRUST, _YAW_STAYS, _WITHOUT_THROTTLE = 8, 0, 2
 _MAX_SPIN = 0.3
 _ALT_MAX, _CIRCLE = 1, 2
 LAND = 9
@@ -55,6 +55,7 @@ class CopterCommands(Commands):
             pilot, fence, needs, self.modes, lambda: tasks.guided(self._guided_settings), self._circle
         )
         self.modes.enters[CIRCLE] = self.motion.circle
+        self.modes.starts_armed = lambda: bool(int(parameters["AUTO_OPTIONS"]) & _WITHOUT_THROTTLE)
         self.taken, self.exempt = self.motion.setpoint, self._exempt
         pilot.readiness.further = self._prearm
         self.modes.select(int(parameters["INITIAL_MODE"]))

@@ -48,6 +48,7 @@ class Missions:
         unmet: Unmet needs of mode mission, with reasons.
         checking: Whether `check_on` is due, as a long mission takes several frames.
         boot_unix_us: Unix time at simulated time 0, if items may name a time of day; else 0.
+        copter: Whether heights of 0 keep the height, and take-offs may be to below the ground, as with ArduCopter.
         functions: Functions of items, to carry out and remove.
     """
 
@@ -64,7 +65,7 @@ class Missions:
         self._found: list[tuple[int, Vector]] = []
         self._checked = 0
         self._reached: list[int] = []
-        self.boot_unix_us = 0
+        self.boot_unix_us, self.copter = 0, False
         self.functions: list[AuxFunction] = []
         self.changes = 0
 
@@ -138,7 +139,7 @@ class Missions:
         behaviour = self._behaviour
         acceptance_m = max(behaviour.acceptance_m, 0.1)
         self._executor.defaults = Defaults(
-            acceptance_m, behaviour.takeoff_height_m, behaviour.orbit_radius_m, behaviour.items_face
+            acceptance_m, behaviour.takeoff_height_m, behaviour.orbit_radius_m, behaviour.items_face, self.copter
         )
         return MissionTask(self._executor, self, turns, legs)
 
@@ -214,7 +215,8 @@ class Missions:
         """Report bad items; `outside` names one outside the fence."""
         home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
-        flown = [each for each in found if items[each[0]].command not in _ON_THE_GROUND]
+        without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if self.copter else _ON_THE_GROUND
+        flown = [each for each in found if items[each[0]].command not in without]
         reasons = {
             Need.WITHIN_REACH: _first(found, too_far),
             Need.INSIDE_FENCE: outside,

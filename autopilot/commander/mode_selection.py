@@ -29,6 +29,7 @@ class ModeSelection:
 
     Attributes:
         enters: By number, how modes begin that the vehicle does not have.
+        starts_armed: Whether a mode that waits starts without throttle.
         base_modes: Of HEARTBEAT without the armed bit: without sticks, and with them.
     """
 
@@ -37,6 +38,7 @@ class ModeSelection:
         self._numbers = book.numbers
         self.shown = self._numbers[book.first]
         self.enters: dict[int, Callable[[], Refusal | None]] = {}
+        self.starts_armed: Callable[[], bool] = lambda: False
         self._waits = self._armed = False
         self._state: State | None = None
         self._saving = Action.NONE
@@ -49,7 +51,8 @@ class ModeSelection:
             self._follow(pilot)
         if self._waits:
             sticks = pilot.sensed.steered.sticks
-            if pilot.state.armed and sticks is not None and sticks.thrust > _THROTTLE_UP:
+            raised = sticks is not None and sticks.thrust > _THROTTLE_UP
+            if pilot.state.armed and (raised or self.starts_armed()):
                 self.start()
 
     def _follow(self, pilot: Pilot) -> None:

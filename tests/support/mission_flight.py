@@ -13,7 +13,7 @@ from colibri.autopilot.guidance.mission.executor import (
     Reached,
     SetHome,
 )
-from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
+from colibri.autopilot.guidance.mission.items import COPTER_RULES, FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
@@ -44,7 +44,8 @@ class Flight:
 
     def __init__(self, *items: MissionItem, flying: bool = True, rules: Rules = MISSION_RULES) -> None:
         assert all(rules.check_item(each) == ACCEPTED for each in items)
-        self.mission = MissionExecutor(items, Defaults(acceptance_m=0.5, takeoff_height_m=2.5, orbit_radius_m=10.0))
+        defaults = Defaults(acceptance_m=0.5, takeoff_height_m=2.5, orbit_radius_m=10.0, copter=rules is COPTER_RULES)
+        self.mission = MissionExecutor(items, defaults)
         self.position: Vector = (HOME[0], HOME[1], HOME[2] + (5.0 if flying else 0.0))
         self.landed = not flying
         self.yaw = 0.0

@@ -11,7 +11,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.wire.dialect import mav
 
-MIN_RADIUS_M = 1.0
+MIN_RADIUS_M = MIN_TAKEOFF_M = 1.0
 _TURNED_RAD = radians(5.0)
 _TURN_WITHIN_S = 30.0
 
@@ -31,12 +31,13 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Numbers for items that leave them out; `face` is as `Behaviour.items_face`."""
+    """Numbers for items that leave them out; `face` is as `Behaviour.items_face`, `copter` as `Missions.copter`."""
 
     acceptance_m: float = 0.5
     takeoff_height_m: float = 2.5
     orbit_radius_m: float = 10.0
     face: bool | None = None
+    copter: bool = False
 
 
 class ItemContext(NamedTuple):
@@ -48,12 +49,13 @@ class ItemContext(NamedTuple):
     speed_m_s: float | None
 
     def place(self, item: MissionItem) -> Vector:
-        """Return the place of an item; 0, 0 is where the vehicle is going, and a height of 0 with it its height."""
+        """Return the place of an item; 0, 0 is where the vehicle is going."""
         now, order = self.mission_context, self.order
-        if not is_here(item):
-            return place_of(item, now.home_enu_m, now.origin)
         x, y, z = order.position_enu_m if isinstance(order, GoTo) else now.position_enu_m
-        return (x, y, height_of(item, now.home_enu_m, now.origin) if item.z else z)
+        if not is_here(item):
+            x, y, _ = place_of(item, now.home_enu_m, now.origin)
+        keeps = self.defaults.copter and item.z == 0.0
+        return (x, y, z if keeps else height_of(item, now.home_enu_m, now.origin))
 
     def yaw(self, item: MissionItem) -> float | None:
         """Return the heading of an item, rad; None is along its way."""
@@ -110,9 +112,12 @@ def _circle(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 def _take_off(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     mission_context, defaults = context.mission_context, context.defaults
+    here_m = mission_context.position_enu_m[2]
     height = height_of(item, mission_context.home_enu_m, mission_context.origin)
+    if mission_context.landed and height <= here_m:
+        height = here_m + MIN_TAKEOFF_M
     yaw = context.yaw(item)
-    high = mission_context.position_enu_m[2] >= height - defaults.acceptance_m and not mission_context.landed
+    high = here_m >= height - defaults.acceptance_m and not mission_context.landed
     up = () if high else (LegPhase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
     if is_here(item):
         return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))

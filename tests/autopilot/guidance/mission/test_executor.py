@@ -75,10 +75,7 @@ def test_items_of_arducopter_at_0_0_are_where_it_is_going() -> None:
     [((4.0, 0, 0, 0), 4.0), ((0, 12, 0, 10), 10.0), ((-1.0, 11, 59, 59), 86_399.0), ((0, -1, 1, 5), 65.0)],
 )
 def test_delays_of_arducopter_may_end_at_a_time(numbers: tuple[float, ...], wait_s: float) -> None:
-    (leg,) = phases_of(
-        item("NAV_DELAY")._replace(**dict(zip(("p1", "p2", "p3", "p4"), numbers, strict=True))),
-        ItemContext(AT_NOON, Defaults(), Hold(), None),
-    )
+    (leg,) = phases_of(item("NAV_DELAY", None, *numbers), ItemContext(AT_NOON, Defaults(), Hold(), None))
     assert not leg.ends(AT_NOON, wait_s - 0.01)
     assert leg.ends(AT_NOON, wait_s + 0.01)
 
