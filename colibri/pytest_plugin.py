@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from colibri.sitl import marks as flight_marks
 from colibri.sitl.errors import SitlError
-from colibri.sitl.marks import MARKS, arguments, described, setting_values, signature, without_effect, written
-from colibri.sitl.summary import FLOWN, SAID, Summary, attachments, in_system_out
 
 if TYPE_CHECKING:
     from colibri.sitl.backends.launcher import Launcher
@@ -32,7 +31,7 @@ _PLAIN = re.compile(r"[\w./]+(::\w+)*(\[[\w.-]+\])?", re.ASCII)
 """Names of tests that differ as folders, too; others get a hash."""
 _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
-_SUMMARY = pytest.StashKey[Summary]()
+_SUMMARY = pytest.StashKey[flight_marks.Summary]()
 _SAID = pytest.StashKey[str]()
 _SAYS_COMPILING = pytest.StashKey[bool]()
 _UNWRITTEN = pytest.StashKey[str]()
@@ -70,19 +69,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    for name in MARKS:
-        config.addinivalue_line("markers", described(name) if config.getoption("markers") else signature(name))
-    config.stash[_SUMMARY] = Summary(perf_counter())
+    words = flight_marks.described if config.getoption("markers") else flight_marks.signature
+    for name in flight_marks.MARKS:
+        config.addinivalue_line("markers", words(name))
+    config.stash[_SUMMARY] = flight_marks.Summary(perf_counter())
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     mark = metafunc.definition.get_closest_marker("seeds")
     if mark is None or "sitl_seed" not in metafunc.fixturenames:
         return
-    values = arguments(mark, f"{metafunc.definition.name}: ")
+    values = flight_marks.arguments(mark, f"{metafunc.definition.name}: ")
     first, last = values["first"], values["last"]
     if not (isinstance(first, int) and isinstance(last, int) and first <= last):
-        wrong = f"{metafunc.definition.name}: {written(mark)}"
+        wrong = f"{metafunc.definition.name}: {flight_marks.written(mark)}"
         pytest.fail(f"{wrong}: give the first and the last seed, whole numbers", pytrace=False)
     metafunc.parametrize("sitl_seed", range(first, last + 1), indirect=True, ids=lambda seed: f"seed{seed}")
 
@@ -91,7 +91,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def sitl_seed(request: pytest.FixtureRequest) -> int | None:
     """Return the seed of mark `seeds` or `seed`."""
     mark = request.node.get_closest_marker("seed")
-    seed: int | None = getattr(request, "param", None if mark is None else arguments(mark)["number"])
+    seed: int | None = getattr(request, "param", None if mark is None else flight_marks.arguments(mark)["number"])
     return seed
 
 
@@ -125,7 +125,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if registered is None:
         lines: list[str] = item.config.getini("markers")
         registered = item.config.stash[_REGISTERED] = [re.split(r"[:(]", line)[0].strip() for line in lines]
-    wrong = without_effect(item, getattr(item, "fixturenames", ()), registered)
+    wrong = flight_marks.without_effect(item, getattr(item, "fixturenames", ()), registered)
     if wrong is not None:
         pytest.fail(wrong, pytrace=False)
 
@@ -138,18 +138,18 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         return report
     if report.when == "teardown":
         del item.stash[_FLIGHTS]
-        setattr(report, SAID, item.stash.get(_SAID, ""))
+        setattr(report, flight_marks.SAID, item.stash.get(_SAID, ""))
         return report
     if report.when == "setup" and report.passed:
         return report
     flown = flights.summary()
-    setattr(report, FLOWN, flown)
+    setattr(report, flight_marks.FLOWN, flown)
     properties = [("sitl_simulated_s", round(flown["simulated_s"], 6))]
     if report.failed:
         places, said = _kept(item, report, flights)
         properties += [("sitl_kept", place.as_posix()) for place in places]
         report.sections.append(("sitl", said))
-        item.stash[_SAID] = said + attachments(places, item.config.invocation_params.dir)
+        item.stash[_SAID] = said + flight_marks.attachments(places, item.config.invocation_params.dir)
     report.user_properties += properties
     item.user_properties += properties  # JUnit XML has those of the report on the teardown
     return report
@@ -206,8 +206,8 @@ class _Collector:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> Generator[None]:
-        self._config.stash[_SUMMARY].add(report.nodeid, report.outcome, getattr(report, FLOWN, None))
-        with in_system_out(self._config, report):
+        self._config.stash[_SUMMARY].add(report.nodeid, report.outcome, getattr(report, flight_marks.FLOWN, None))
+        with flight_marks.in_system_out(self._config, report):
             yield
 
 
@@ -269,7 +269,7 @@ def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
     marks = [*reversed(list(node.iter_markers("sitl"))), *map(node.get_closest_marker, ("vehicle", "feedback", "wind"))]
-    said: list[Mapping[str, Any]] = [setting_values(mark) for mark in marks if mark is not None]
+    said: list[Mapping[str, Any]] = [flight_marks.setting_values(mark) for mark in marks if mark is not None]
     return said if seed is None else [*said, {"seed": seed}]
 
 

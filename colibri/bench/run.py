@@ -17,8 +17,15 @@ from rich.table import Table
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.commands import COMMANDS, colibri_of, command_figures
-from colibri.bench.costs import CHANNELS, FLIGHTS_A_RUN, sensing_figures, serving_figures
-from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
+from colibri.bench.costs import (
+    AIR,
+    CHANNELS,
+    FLIGHTS_A_RUN,
+    VEHICLES,
+    sensing_figures,
+    serving_figures,
+    simulator_figures,
+)
 from colibri.bench.speed import CONTROL_S, LINKS, PeerSimulator, Report, rate_figures
 from colibri.bench.stages import BLOCKS, stage_figures
 from colibri.common.files import regular

@@ -18,10 +18,9 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.guidance.trajectories.loading import file_text
-from colibri.campaigns.definition import Campaign, Logs, Point
+from colibri.campaigns.definition import Campaign, Logs, Metric, Point
 from colibri.campaigns.engines.pool import Engine, Killed
 from colibri.campaigns.factors import CampaignError, key_of, with_keys
-from colibri.campaigns.metrics import Metric
 from colibri.common.errors import Error, ForeignError
 from colibri.common.process.failure_file import FAILURE
 from colibri.common.spec import from_values

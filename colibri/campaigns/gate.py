@@ -10,9 +10,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from colibri.analysis.limits import ReportLimit, above, loss_exceeds
+from colibri.campaigns.definition import Metric
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.metrics import Metric
 from colibri.common.process.lifecycle import EXIT_FAILED
 
 

@@ -6,12 +6,11 @@ from contextlib import closing
 from typing import Any
 
 from colibri.analysis.tables import print_table
-from colibri.campaigns.bar import FlightBar
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.results import CampaignResults
-from colibri.campaigns.run import engine_of, fly_campaign
+from colibri.campaigns.run import FlightBar, engine_of, fly_campaign
 from colibri.common.process.lifecycle import one_line
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec

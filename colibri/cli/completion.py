@@ -10,8 +10,7 @@ from colibri.autopilot.__main__ import command_line as autopilot
 from colibri.autopilot.control.profile import profile_names
 from colibri.autopilot.control.registry import controller_names
 from colibri.autopilot.guidance.trajectories.registry import track_names
-from colibri.cli.commands import COMMANDS
-from colibri.cli.parser import parser_of
+from colibri.cli.commands import COMMANDS, parser_of
 from colibri.common.process.arguments import ArgumentParser
 from colibri.plant.__main__ import command_line as plant
 from colibri.plant.vehicle.description import vehicle_names

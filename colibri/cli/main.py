@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 
-from colibri.cli.commands import COMMANDS, PROCESSES
-from colibri.cli.parser import parser_for
+from colibri.cli.commands import COMMANDS, PROCESSES, parser_for
 from colibri.common.errors import Error
 from colibri.common.process import lifecycle
 from colibri.common.process.output import use_streams

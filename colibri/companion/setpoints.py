@@ -8,7 +8,7 @@ from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Array, Vector
 from colibri.companion.settings import SetpointKind
-from colibri.companion.steering import response as model
+from colibri.companion.steering import predictor as model
 from colibri.companion.steering.law_pilot import LawDemand, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.conversation import Encoded

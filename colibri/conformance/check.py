@@ -11,11 +11,10 @@ from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, one_line
 from colibri.conformance.interface_checks import interface_checks, limit_checks
 from colibri.conformance.loop_flight import restart_checks
-from colibri.conformance.memory_checks import memory_checks
-from colibri.conformance.optional_checks import optional_checks
+from colibri.conformance.optional_checks import memory_checks, optional_checks
 from colibri.conformance.step_records import flight_checks, time_checks
 from colibri.conformance.subject import Check, Result, Row, Subject
-from colibri.experiments.notebook import table_html
+from colibri.experiments.table import table_html
 
 CHECKS: dict[str, Check] = {
     "interface": interface_checks,

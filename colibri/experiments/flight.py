@@ -17,8 +17,7 @@ from colibri.common.config import UNREADABLE
 from colibri.common.errors import checked, unknown
 from colibri.common.files import read_bytes
 from colibri.common.spec import from_values, keywords_of
-from colibri.experiments.notebook import figure_html, table_html
-from colibri.experiments.table import SampleTable, table_of
+from colibri.experiments.table import SampleTable, figure_html, table_html, table_of
 from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of

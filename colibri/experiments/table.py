@@ -1,12 +1,18 @@
-"""Tables of a flight as structured arrays."""
+"""Tables of a flight as structured arrays, and HTML of tables and figures for notebooks."""
 
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
-from typing import Any
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from colibri.common.errors import Error
 from colibri.common.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class PandasError(Error):
@@ -32,3 +38,14 @@ class SampleTable(np.ndarray[Any, np.dtype[np.void]]):
 def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> SampleTable:
     rows = np.concatenate([np.empty((0, len(columns))), *blocks])
     return rows.view([(name, np.float64) for name in columns])[:, 0].view(SampleTable)
+
+
+def table_html(title: str, rows: Iterable[Sequence[str]]) -> str:
+    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
+    return f"<b>{escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+def figure_html(figure: "Figure") -> str:
+    png = BytesIO()
+    figure.savefig(png, format="png", dpi=80)
+    return f'<img src="data:image/png;base64,{b64encode(png.getvalue()).decode()}">'

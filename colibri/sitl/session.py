@@ -16,8 +16,7 @@ from colibri.sitl.backends.lockstep_session import LockstepSession, PlantSide
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
-from colibri.sitl.flight_figure import draw
-from colibri.sitl.flight_record import FACTS, FIGURE
+from colibri.sitl.flight_record import FACTS, FIGURE, draw
 from colibri.sitl.stepping import Stepped
 from colibri.sitl.vehicle import Sitl
 

@@ -17,14 +17,13 @@ from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, comma_separated, print_table, write_table
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Point, campaign_of
+from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Metric, Point, campaign_of
 from colibri.campaigns.engines.pool import Pool, with_bar
 from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Common, FlightResult, Verdict, check, common_of, fly_points, plan_point
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.journal import Journal, read_journal
-from colibri.campaigns.metrics import Metric
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import one_line

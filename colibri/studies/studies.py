@@ -22,8 +22,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import study_figures
-from colibri.studies.study_figures import StudyResult
-from colibri.studies.study_flights import Flown, fly
+from colibri.studies.study_figures import Flown, StudyResult, fly
 
 FORMATS = ("png", "svg")
 LPV_MPC, ON_PATH, SE3, THESIS = "LPV-MPC", "LPV-MPC on the path", "SE(3)", "thesis"

@@ -21,10 +21,9 @@ from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.common.errors import checked
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
-from colibri.tuning.results import TuningResults, tuned_name
+from colibri.tuning.results import TuningResults, check_campaign, tuned_name
 from colibri.tuning.space import TuningError
 from colibri.tuning.trials import Begun, FileLock, FinishedTrial, Trials, require_optuna
-from colibri.tuning.verdict import check_campaign
 
 _WORST, _EACH = "worst", "each"
 

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from colibri.campaigns.definition import NAMES, Metric, read_metrics
 from colibri.campaigns.factors import Choice, LogUniform, Uniform, is_number, read_draw, shown
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.metrics import NAMES, Metric, read_metrics
 from colibri.common.errors import Error, unknown
 from colibri.common.types import Array
 

@@ -13,7 +13,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.flights.fleet_spec import GROUND_PORT, SDK_PORT
 from tests.clients.support.geometry import closest_m, place
 from tests.clients.support.mavproxy import MavProxy
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle
 
 PAGE = Path(__file__).parents[2] / "docs" / "ground-stations.md"
 GIVE_UP_AFTER_S = 120.0

@@ -9,7 +9,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from tests.clients.support.geometry import place
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle
 
 PROGRAMS = Path(__file__).parent / "programs"
 SPEED = 4.0

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from tests.clients.support.ground_station import GroundStation, Message
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 SYSTEMS = (3, 4, 5)

@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from tests.clients.support.client import Client
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 ROOT = Path(__file__).parents[2]
 WITHIN_S = 120.0

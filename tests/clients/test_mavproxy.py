@@ -15,8 +15,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.ports import bound_socket
-from tools.harness.processes import wait_for
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle, wait_for
 
 pytestmark = pytest.mark.clients
 

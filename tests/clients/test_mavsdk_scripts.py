@@ -15,7 +15,7 @@ from tests.clients.mavsdk_scripts import flights, offboard, services
 from tests.clients.support.client import Client
 from tests.clients.support.geometry import away_m, closest_m, during, heading_deg, speed_m_s, swept_rad
 from tools.harness.observer import Observer
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle
 
 ROOT = Path(__file__).parents[2]
 SPEED = 3.0

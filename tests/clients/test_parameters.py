@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 NAME = "SYS_AUTOCONFIG"
 SIGNALLING = [(-8388607, -4194305), (2139095041, 2143289343)]

@@ -13,7 +13,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.observer import Sight
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle
 
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 CUSTOM = mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED

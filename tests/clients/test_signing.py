@@ -7,8 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from tests.clients.support.ground_station import GroundStation
-from tools.harness.processes import wait_for
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle, wait_for
 
 KEY = bytes(range(1, 33))
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED

@@ -14,17 +14,15 @@ from rich.console import Console
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.earth.geodesy import enu_of
 from colibri.common.earth.home import DEFAULT_HOME
-from colibri.flights.fleet import Member, place_of, start_again
+from colibri.flights.fleet import Member, StatusLines, place_of, start_again, status_table
 from colibri.flights.fleet_spec import FleetSpec
-from colibri.flights.fleet_status import StatusLines, status_table
 from colibri.flights.launcher import Child, end_children
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode
 from colibri.plant.spec import PlantSpec
 from tests.clients.support.ground_station import GroundStation
-from tools.harness.processes import wait_for
-from tools.harness.sitl_process import WAITING, SitlProcess, vehicle
+from tools.harness.processes import WAITING, SitlProcess, vehicle, wait_for
 
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 

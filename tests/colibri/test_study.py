@@ -15,7 +15,7 @@ from colibri.cli.main import main
 from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies.studies import FORMATS, STUDIES, Measure, Settings, Study, StudyCase, campaign, table, write
-from colibri.studies.study_flights import Flown, fly
+from colibri.studies.study_figures import Flown, fly
 from tests.support.campaigns import Here
 from tests.support.commands import Ran
 

@@ -10,7 +10,7 @@ from textwrap import dedent
 import pytest
 
 from tests.support.pages import ROOT
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 LINES = 40

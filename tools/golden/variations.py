@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.verification.golden import FOUND
+from colibri.verification.verify import FOUND
 
 MIN_MINOR, MAX_MINOR = 11, 19
 """Minor versions of Python 3 to look for."""

@@ -14,7 +14,7 @@ import psutil
 
 from colibri import plant
 from tools.harness.ports import OnPort
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 from tools.harness.stations import CirclingCompanion, HarnessStation
 
 MAX_GAP_S = 1.5

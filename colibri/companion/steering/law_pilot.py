@@ -29,9 +29,9 @@ from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array, Vector
 from colibri.companion.stack import Response
-from colibri.companion.steering import response as model
+from colibri.companion.steering import predictor as model
+from colibri.companion.steering.predictor import slowed
 from colibri.companion.steering.references import Stay
-from colibri.companion.steering.response import slowed
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 

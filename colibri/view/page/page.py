@@ -8,8 +8,7 @@ import viser
 
 from colibri.common.types import Vector
 from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
-from colibri.view.page.controls import CommandPanels, ControlPanel, Done, words
-from colibri.view.page.plots import Plots
+from colibri.view.page.controls import CommandPanels, ControlPanel, Done, Plots, words
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
 from colibri.view.page.server import PageServer, Token, address, stop
 from colibri.view.snapshot import Snapshot, Source

@@ -21,7 +21,7 @@ from colibri.common.process.lifecycle import fail
 from tests.clients.support.client import Client
 from tests.clients.support.example_flights import Evidence
 from tests.clients.support.example_table import EXAMPLES, Example
-from tools.harness.sitl_process import SitlProcess, vehicle
+from tools.harness.processes import SitlProcess, vehicle
 
 SDK_LINK = "udpout:127.0.0.1:14540"
 

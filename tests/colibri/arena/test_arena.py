@@ -11,8 +11,7 @@ import pytest
 import colibri
 from colibri.arena import run
 from colibri.arena.flights import Arena, Row
-from colibri.arena.results import ArenaResults
-from colibri.arena.run import laws_of, planned_of
+from colibri.arena.run import ArenaResults, laws_of, planned_of
 from colibri.campaigns.flights import FlightResult, Verdict, check, common_of
 from colibri.common.config import toml_names
 from colibri.plant.vehicle.description import vehicle_text

@@ -10,7 +10,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench import commands, costs, run, simulators, speed, stages
+from colibri.bench import commands, costs, run, speed, stages
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -100,11 +100,9 @@ def test_the_estimator_and_sensor_flights_are_timed(tmp_path: Path) -> None:
 
 def test_the_plant_is_timed_as_a_simulator_of_others(tmp_path: Path) -> None:
     exchanges = figures_of(tmp_path / "simulators.json", "--only", "simulators")["simulators"]["exchange_us"]
-    assert (
-        len(exchanges) == len(simulators.VEHICLES) * len(simulators.AIR) == run.parts(["simulators"], 1, beside=False)
-    )
+    assert len(exchanges) == len(costs.VEHICLES) * len(costs.AIR) == run.parts(["simulators"], 1, beside=False)
     for name, figure in exchanges.items():
-        frames_hz = simulators.FRAMES_HZ[name.partition(",")[0]]
+        frames_hz = costs.FRAMES_HZ[name.partition(",")[0]]
         assert 0.0 < figure["p50"] <= figure["p99"]
         assert figure["samples"] == pytest.approx(float(SHORT_S) * frames_hz, abs=110)
 

@@ -3,11 +3,10 @@ from typing import Any
 
 import pytest
 
-from colibri.campaigns.definition import CampaignTables, campaign_of, tables_of
+from colibri.campaigns.definition import CampaignTables, campaign_of, tables_of, usual
 from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flights import check, common_of, plan_point
 from colibri.campaigns.journal import identity_of
-from colibri.campaigns.metrics import usual
 from colibri.common.errors import Error
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.campaigns import MASS, planned, results

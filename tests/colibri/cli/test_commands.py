@@ -12,10 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.commands import COMMANDS, PROCESSES
+from colibri.cli.commands import COMMANDS, PROCESSES, parser_of
 from colibri.cli.main import main
 from colibri.cli.options import SHELLS
-from colibri.cli.parser import parser_of
 from colibri.flights.provenance import plan_of
 from tests.support.commands import FLIGHT, VEHICLE, Ran, Refused, edited, exit_code
 

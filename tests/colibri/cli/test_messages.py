@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.commands import COMMANDS
-from colibri.cli.parser import add_options
+from colibri.cli.commands import COMMANDS, add_options
 from colibri.common.errors import Error, InFlightError
 from colibri.common.process.arguments import ArgumentParser
 from tests.support.commands import Refused

@@ -4,7 +4,7 @@ from scipy.linalg import expm
 
 from colibri.common.jit import packed
 from colibri.companion.stack import Response
-from colibri.companion.steering import response as model
+from colibri.companion.steering import predictor as model
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.states import TimedState
 from colibri.plant.vehicle.description import load_vehicle

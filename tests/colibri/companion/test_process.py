@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.commands import Refused
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 LINK = "udpin:127.0.0.1:0"
 MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [

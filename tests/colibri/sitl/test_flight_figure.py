@@ -2,7 +2,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from colibri.sitl.flight_figure import _draw_place
+from colibri.sitl.flight_record import _draw_place
 
 
 def test_neither_the_legend_nor_another_curve_covers_a_curve() -> None:

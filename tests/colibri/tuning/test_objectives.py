@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 
 import colibri
+from colibri.campaigns.definition import Metric
 from colibri.campaigns.flights import Verdict
-from colibri.campaigns.metrics import Metric
 from colibri.tuning.space import Objective, TuningError, metrics_of, read_objectives
 from tests.support.tuning import flown
 

@@ -6,7 +6,7 @@ import pytest
 import colibri
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.tuning.verdict import Compared, better, check_campaign, compare
+from colibri.tuning.results import Compared, better, check_campaign, compare
 from tests.support.tuning import WEIGHTS, planned
 
 SEEDS = 40

@@ -10,8 +10,9 @@ from colibri.autopilot.control.registry import GROUP
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.cli.options import GOLDEN_HASHES
 from colibri.sitl.vehicle import Sitl
-from colibri.verification import golden, golden_flights
-from colibri.verification.cases import SitlCase, TrackCase
+from colibri.verification import golden_flights
+from colibri.verification import verify as golden
+from colibri.verification.golden_flights import SitlCase, TrackCase
 from tests.support.commands import Ran
 
 SHORT = TrackCase("short", {"track": "line", "profile": "se3", "duration": 0.4})

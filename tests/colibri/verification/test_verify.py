@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from colibri.verification import verify
-from colibri.verification.cases import TrackCase
+from colibri.verification.golden_flights import TrackCase
 from tests.support.commands import Ran
 
 

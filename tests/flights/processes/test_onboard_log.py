@@ -16,7 +16,7 @@ from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.conversation import Conversation
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from tests.support.log_conversations import DownloadLog, ListLogs
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from colibri.mavlink.links.open import open_link
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
-from colibri.plant.process.ardupilot import ArduPilotEnd
+from colibri.plant.process.ardupilot_server import ArduPilotEnd
 from colibri.plant.vehicle.description import Rotors, VehicleError, load_vehicle
 from tests.support.ardupilot import pulses, read, request
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, begins_as_recorded, running, topic_rows

@@ -5,8 +5,7 @@ from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
 from collections.abc import Iterator
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
-from colibri.cli.commands import COMMANDS, GROUPS, PROCESSES
-from colibri.cli.parser import parser_of
+from colibri.cli.commands import COMMANDS, GROUPS, PROCESSES, parser_of
 from colibri.plant.__main__ import command_line as plant_command_line
 from tools.pages.tables import with_body
 

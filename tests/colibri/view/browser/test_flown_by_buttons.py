@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from tools.harness.sitl_process import vehicle
+from tools.harness.processes import vehicle
 
 pytestmark = pytest.mark.view
 HEIGHT_M = 3.0
