@@ -13,7 +13,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
 from colibri.autopilot.guidance.tasks.guided import GuidedSettings
 from colibri.mavlink.parameters.store import ParamError
-from colibri.mavlink.services.command import DENIED, FAILED, Handler, ReceivedCommand
+from colibri.mavlink.services.command import DENIED, FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.services.statustext import CRITICAL, INFO
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -23,19 +23,23 @@ DO_SEND_BANNER = 42428
 _BY_THRUST, _YAW_STAYS, _WITHOUT_THROTTLE = 8, 0, 2
 _MAX_SPIN = 0.3
 _ALT_MAX, _CIRCLE = 1, 2
-LAND = 9
+STABILIZE, LAND, GUIDED_NOGPS = 0, 9, 20
 _RADIO, _STATION = Condition.STICKS_LOST, Condition.STATION_LOST
 _CONTINUES_GUIDED = ((4, _RADIO, "Guided Mode"),)
 _CONTINUES = {
     AUTO: ((1, _RADIO, "Auto"), (2, _STATION, "Auto Mode")),
     LAND: ((8, _RADIO, "Landing"), (8, _STATION, "Landing")),
-    **dict.fromkeys((0, ALT_HOLD, LOITER, POSHOLD), ((16, _STATION, "Pilot Control"),)),
+    **dict.fromkeys((STABILIZE, ALT_HOLD, LOITER, POSHOLD), ((16, _STATION, "Pilot Control"),)),
 }
 """What continues in spite of a loss, by mode and bit of FS_OPTIONS."""
+_WITHOUT_POSITION, _LANDS_ALWAYS = (STABILIZE, ALT_HOLD, GUIDED_NOGPS), 3
 _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
 _TESTED_MOTORS = range(1, 9)
+_KEEPS = 76.0
+_CALIBRATED = (1.0, 2.0, 4.0, _KEEPS)
+"""Parameter 5 of PREFLIGHT_CALIBRATION: accelerometer, level, accelerometer at rest, the present values."""
 _ACCEPTED = (
     *(mav.MAV_CMD_DO_SET_RELAY, mav.MAV_CMD_DO_REPEAT_SERVO, mav.MAV_CMD_DO_REPEAT_RELAY, mav.MAV_CMD_DO_SET_ROI),
     *(mav.MAV_CMD_DO_SET_ROI_LOCATION, mav.MAV_CMD_DO_SET_ROI_NONE, mav.MAV_CMD_DO_MOUNT_CONTROL),
@@ -81,6 +85,8 @@ class CopterCommands(Commands):
         exempt = {loss: continues for bit, loss, continues in rows if options & bit}
         if not value["FS_THR_ENABLE"]:
             exempt[_RADIO] = ""
+        if self.modes.shown.number in _WITHOUT_POSITION and value["FS_EKF_ACTION"] != _LANDS_ALWAYS:
+            exempt[Condition.GPS_LOST] = self.modes.shown.name
         return exempt
 
     def _prearm(self) -> Iterator[str]:
@@ -117,6 +123,8 @@ class CopterCommands(Commands):
             mav.MAV_CMD_DO_SET_SERVO: self._set_servo,
             mav.MAV_CMD_DO_MOTOR_TEST: self._test_motors,
             mav.MAV_CMD_DO_JUMP_TAG: self._jump_to_tag,
+            mav.MAV_CMD_DO_LAND_START: lambda _: Refusal("No landing sequence found", FAILED),
+            mav.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             DO_SEND_BANNER: self._send_banner,
         }
 
@@ -190,6 +198,17 @@ class CopterCommands(Commands):
     def _jump_to_tag(self, command: ReceivedCommand) -> Refusal | None:
         valid = 0.0 <= command.p1 <= _MAX_TAG
         return Refusal(f"mission: there is no tag {command.p1:g}", FAILED if valid else DENIED)
+
+    def _calibrate(self, command: ReceivedCommand) -> Refusal | None:
+        """Accept calibrations of gyroscopes, barometers and accelerometers, without effect."""
+        if self._pilot.state.armed:
+            return Refusal("calibration refused: the rotors are armed", DENIED)
+        if command.p3 == 1.0:
+            self._pilot.say(INFO, "Updating barometer calibration")
+            self._pilot.say(INFO, "Barometer calibration complete")
+        elif command.p1 != 1.0 and command.x not in _CALIBRATED and command.p2 != _KEEPS:
+            return Refusal("calibration refused: only gyro, pressure, accel and level are known", UNSUPPORTED)
+        return None
 
     def _set_servo(self, command: ReceivedCommand) -> Refusal | None:
         return None if command.p1 >= 1.0 else Refusal(f"servo: {command.p1:g} is not 1 or more", FAILED)

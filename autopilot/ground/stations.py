@@ -288,7 +288,6 @@ class Stations:
 
     def _handlers(self, commands: Commands, modes: StandardModes) -> Mapping[int, Handler]:
         return {
-            **commands.handlers(),
             **self.streams.handlers(),
             **modes.handlers(),
             **self.system.handlers(),
@@ -296,6 +295,7 @@ class Stations:
             mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
                 command, enabled=self.pilot.behaviour.inject_failures
             ),
+            **commands.handlers(),
         }
 
 

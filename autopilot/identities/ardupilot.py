@@ -173,8 +173,8 @@ _TEXTS: tuple[tuple[str, str | Callable[[Match[str]], str]], ...] = (
     (r"^(Failsafe activated|Failsafe): sticks lost.*", "Radio Failsafe"),
     (r"^(Failsafe activated|Failsafe|Warning): battery (low|critical).*", r"Battery 1 is \2"),
     (r"^(Failsafe activated|Failsafe|Warning): geofence breached.*", "Fence Breached"),
-    (r"^Failsafe activated: (position lost|estimate invalid).*", "EKF Failsafe: changed to LAND Mode"),
-    (r"^(Failsafe activated|Failsafe|Warning): GPS lost.*", "GPS Glitch or Compass error"),
+    (r"^Failsafe activated: (position lost|estimate invalid|GPS lost).*", "EKF Failsafe: changed to LAND Mode"),
+    (r"^(Failsafe|Warning): GPS lost.*", "GPS Glitch or Compass error"),
 )
 """Status texts of Colibri, and ArduCopter's; empty where it sends none."""
 

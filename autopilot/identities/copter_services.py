@@ -136,14 +136,18 @@ class Places(Polled):
         return (pilot.home.position_enu_m, pilot.home.origin, pilot.ground.times.flights)
 
 
-class VersionRequests:
-    handles = frozenset({"AUTOPILOT_VERSION_REQUEST"})
+class Requests:
+    """Answers a request of the version, and of terrain: it is not known anywhere."""
+
+    handles = frozenset({"AUTOPILOT_VERSION_REQUEST", "TERRAIN_CHECK"})
 
     def __init__(self, served: Served) -> None:
         self._version = served.system.version
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, now_us
+        del now_us
+        if message.name == "TERRAIN_CHECK":
+            return [to(peer, "TERRAIN_REPORT", message.fields.lat, message.fields.lon, 0, 0.0, 0.0, 0, 0)]
         return [to(peer, "AUTOPILOT_VERSION", *self._version)]
 
 
@@ -384,5 +388,5 @@ _WORLD_AT_REST: dict[str, Fault | WorldChange] = {
 
 
 def copter_services(served: Served) -> Sequence[Service]:
-    kinds = (Greeter, Places, VersionRequests, StreamRates, PreArm, Switches, SimulatedWorld)
+    kinds = (Greeter, Places, Requests, StreamRates, PreArm, Switches, SimulatedWorld)
     return [kind(served) for kind in kinds]

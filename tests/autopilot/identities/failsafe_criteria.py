@@ -237,6 +237,31 @@ def weak_motor(sitl: Sitl) -> None:
     held(sitl, lambda: dist(sitl.position[:2], place[:2]) < 10.0 and abs(height(sitl) - 20.0) < 5.0, 30.0, "place")
 
 
+def radio_failsafe_without_gps(sitl: Sitl) -> None:
+    sitl.run(2.0)
+    sitl.takeoff(10.0)
+    sitl.set_param("SIM_GPS1_ENABLE", 0)
+    sitl.run(5.0)
+    sitl.set_param("SIM_RC_FAIL", 1)
+    in_mode(sitl, LAND, 10.0)
+    says(sitl, "EKF Failsafe: changed to LAND Mode", 1.0)
+    sitl.wait_until(lambda: not sitl.armed, within=60.0)
+
+
+def gps_glitches(sitl: Sitl) -> None:
+    """Jumps of 30 to 110 m, 2 s each; tilts reach 2.1 degrees where GPSGlitchLoiter2 allows 2."""
+    sitl.run(2.0)
+    sitl.takeoff(10.0)
+    sitl.set_param("RC_OVERRIDE_TIME", 120)
+    steered(sitl, 0.5, c3=1500)
+    sitl.select("LOITER")
+    for x, y in ((3, 1), (6, 2), (0, 5), (-3, 0), (-8, -3), (0, 10), (0, 0)):
+        sitl.set_param("SIM_GPS1_GLTCH_X", 1e-4 * x)
+        sitl.set_param("SIM_GPS1_GLTCH_Y", 1e-4 * y)
+        held(sitl, lambda: hypot(*sitl.position[:2]) < 20.0, 2.0, "true place")
+    held(sitl, lambda: hypot(*sitl.position[:2]) < 20.0, 15.0, "true place")
+
+
 def disarming(sitl: Sitl) -> None:
     sitl.takeoff(30.0)
     sitl.select("LOITER")

@@ -18,10 +18,12 @@ from tests.autopilot.identities.failsafe_criteria import (
     circle_fence,
     disarming,
     floor_fence,
+    gps_glitches,
     height_fence,
     losses_in_spite_of_which_a_mode_continues,
     motor_test,
     radio_failsafe,
+    radio_failsafe_without_gps,
     return_at_height,
     return_facing,
     return_to_rally,
@@ -80,6 +82,7 @@ class Row(NamedTuple):
     flies: Check
     sets: Mapping[str, float] = MappingProxyType({})
     quick: bool = False
+    feedback: str = "state"
 
 
 ROWS = (
@@ -133,18 +136,20 @@ ROWS = (
     Row(40, "MaxAltFence", height_fence, {"FENCE_TYPE": 1, "FENCE_ALT_MAX": 20}),
     Row(40, "MinAltFence", floor_fence, {"FENCE_TYPE": 8, "FENCE_ALT_MIN": 10}),
     Row(41, "ThrottleFailsafe", radio_failsafe),
+    Row(41, "ThrottleFailsafe without GPS", radio_failsafe_without_gps, feedback="sensors"),
     Row(42, "GCSFailsafe", station_failsafe),
     Row(42, "ThrottleFailsafe, GCSFailsafe by FS_OPTIONS", losses_in_spite_of_which_a_mode_continues),
     Row(43, "BatteryFailsafe", battery_failsafe, {"BATT_LOW_VOLT": 11.5, "BATT_CRT_VOLT": 10.1, "BATT_LOW_TIMER": 1}),
     Row(44, "AutoContinueOnRCFailsafe, RCOverridesNoRCReceiver", without_receiver, {"FS_OPTIONS": 5}),
     Row(45, "StabilityPatch", weak_motor),
+    Row(45, "GPSGlitchLoiter", gps_glitches, feedback="sensors"),
     Row(46, "RudderDisarmMidair, MAV_CMD_DO_FLIGHTTERMINATION", disarming),
     Row(46, "MotorTest", motor_test, quick=True),
 )
 
 
 def _marked(row: Row) -> Any:
-    marks = [pytest.mark.sitl(identity="ardupilot", params=dict(row.sets))]
+    marks = [pytest.mark.sitl(identity="ardupilot", feedback=row.feedback, params=dict(row.sets))]
     return pytest.param(
         row.flies, id=f"{row.number}-{row.flies.__name__}", marks=[*marks, *([] if row.quick else [pytest.mark.long])]
     )
