@@ -9,7 +9,7 @@ from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
 from colibri.common.spec import Option
-from colibri.plant.environment.noise import Noise
+from colibri.plant.environment.random_streams import Noise
 from colibri.plant.environment.weather import NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
 from colibri.plant.events import EVENT, FORMS, event, events_of
 from colibri.plant.physics.start import Start

@@ -9,7 +9,7 @@ from pathlib import Path
 from colibri.common.errors import unknown
 from colibri.common.files import read_given
 from colibri.common.process.arguments import number
-from colibri.plant.environment.noise import NOISES
+from colibri.plant.environment.random_streams import NOISES
 from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
+    from colibri.analysis.figure_series import FigureSeries as FigureSeries
     from colibri.analysis.figures import draw_flight as draw_flight
     from colibri.analysis.logs import RecordingError as RecordingError
     from colibri.analysis.outcome import keep_flight as keep_flight
@@ -14,6 +15,5 @@ if TYPE_CHECKING:
     from colibri.analysis.recording import read_recording as read_recording
     from colibri.analysis.report import print_report as print_report
     from colibri.analysis.report import write_report as write_report
-    from colibri.analysis.series.figure_series import FigureSeries as FigureSeries
 else:
     __getattr__, __dir__ = public(__name__)

@@ -15,9 +15,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
+from colibri.analysis.figure_series import ATTITUDE, POSITION, START_S, FigureSeries, Series
 from colibri.analysis.recording import INPUT, POSITION_REFERENCE, SETTLED_AFTER_S, rotor_names
 from colibri.analysis.report import length as in_metres
-from colibri.analysis.series.figure_series import ATTITUDE, POSITION, START_S, FigureSeries, Series
 from colibri.common.process.lifecycle import EXIT_FAILED, end_with, gc_frozen, handle_endings
 from colibri.flights.launcher import can_fork
 from colibri.flights.plan import FlightPlan

@@ -9,10 +9,9 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from colibri.analysis.logs import RecordingError, log_of
-from colibri.analysis.lost import Lost, lost
+from colibri.analysis.lost import Lost, lost, read_flight
 from colibri.analysis.recording import FlightReader, Samples, TableWriter
 from colibri.analysis.report import Report, encoded_report, report, write_report
-from colibri.analysis.series.flight_series import read_flight
 from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import FAILURE, failure_text
 from colibri.flights.fly import fly_plan

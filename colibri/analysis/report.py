@@ -9,9 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.estimation import FIGURES, read_estimation, rms
-from colibri.analysis.lost import LIMIT_CYCLE_RAD_S, Lost, ground_contact_s, ground_hits, impact, limit_cycle_rad_s
+from colibri.analysis.lost import (
+    LIMIT_CYCLE_RAD_S,
+    FlightSeries,
+    Lost,
+    ground_contact_s,
+    ground_hits,
+    impact,
+    limit_cycle_rad_s,
+)
 from colibri.analysis.recording import SETTLED_AFTER_S
-from colibri.analysis.series.flight_series import FlightSeries
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.elementary import acos

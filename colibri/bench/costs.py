@@ -38,8 +38,8 @@ from colibri.mavlink.streaming.rates import GCS, SDK
 from colibri.mavlink.ulog.inputs import InputRecord, RecordKind
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.mavlink.wire.dialect import Codec, mav
+from colibri.plant.physics.start import nudged
 from colibri.plant.process import ardupilot_server, px4_server
-from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle

@@ -16,7 +16,6 @@ from rich.table import Table
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench.commands import COMMANDS, colibri_of, command_figures
 from colibri.bench.costs import (
     AIR,
     CHANNELS,
@@ -26,7 +25,16 @@ from colibri.bench.costs import (
     serving_figures,
     simulator_figures,
 )
-from colibri.bench.speed import CONTROL_S, LINKS, PeerSimulator, Report, rate_figures
+from colibri.bench.speed import (
+    COMMANDS,
+    CONTROL_S,
+    LINKS,
+    PeerSimulator,
+    Report,
+    colibri_of,
+    command_figures,
+    rate_figures,
+)
 from colibri.bench.stages import BLOCKS, stage_figures
 from colibri.common.files import regular
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line

@@ -11,7 +11,7 @@ from colibri.analysis.tables import Row
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.factors import CampaignError, is_number, shown
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.experiments.table import SampleTable
+from colibri.experiments.flight import SampleTable
 
 _NORMAL_95 = 1.959963984540054
 _QUANTILES = {"median": 0.5, "p05": 0.05, "p95": 0.95}

@@ -19,7 +19,7 @@ from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.campaigns.definition import Campaign, Logs, Metric, Point
-from colibri.campaigns.engines.pool import Engine, Killed
+from colibri.campaigns.engines import Engine, Killed
 from colibri.campaigns.factors import CampaignError, key_of, with_keys
 from colibri.common.errors import Error, ForeignError
 from colibri.common.process.failure_file import FAILURE

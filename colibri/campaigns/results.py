@@ -7,7 +7,7 @@ from colibri.analysis.tables import comma_separated
 from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.journal import keep_files
-from colibri.experiments.table import figure_html, table_html
+from colibri.experiments.flight import figure_html, table_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
-from colibri.campaigns.engines.pool import in_order
+from colibri.campaigns.engines import in_order
 from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 

@@ -77,9 +77,9 @@ def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
 
 
 def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool) -> "Report":
+    from colibri.analysis.figure_series import FigureSeries
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
-    from colibri.analysis.series.figure_series import FigureSeries
 
     flown = FigureSeries(plan)
     found = keep_flight(plan, summary, *([flown.add] if figures else []))

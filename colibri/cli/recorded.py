@@ -7,9 +7,9 @@ from colibri.common.process.lifecycle import fail
 
 
 def plot(args: Namespace) -> int:
+    from colibri.analysis.figure_series import FigureSeries
     from colibri.analysis.figures import draw_flight
     from colibri.analysis.recording import FlightReader
-    from colibri.analysis.series.figure_series import FigureSeries
     from colibri.flights.provenance import plan_of
 
     try:

@@ -14,7 +14,7 @@ from colibri.conformance.loop_flight import restart_checks
 from colibri.conformance.optional_checks import memory_checks, optional_checks
 from colibri.conformance.step_records import flight_checks, time_checks
 from colibri.conformance.subject import Check, Result, Row, Subject
-from colibri.experiments.table import table_html
+from colibri.experiments.flight import table_html
 
 CHECKS: dict[str, Check] = {
     "interface": interface_checks,

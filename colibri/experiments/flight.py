@@ -8,16 +8,15 @@ from warnings import warn
 
 import msgspec
 
+from colibri.analysis.figure_series import FigureSeries
 from colibri.analysis.logs import log_of
 from colibri.analysis.outcome import REPORT, files_of, fly_to_its_end, report_of
 from colibri.analysis.recording import FlightReader, columns_of
 from colibri.analysis.report import Report, report_rows
-from colibri.analysis.series.figure_series import FigureSeries
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import checked, unknown
 from colibri.common.files import read_bytes
 from colibri.common.spec import from_values, keywords_of
-from colibri.experiments.table import SampleTable, figure_html, table_html, table_of
 from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
@@ -28,6 +27,55 @@ from colibri.mavlink.ulog.log import TopicReader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colibri.common.errors import Error
+from colibri.common.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class PandasError(Error):
+    """pandas is not installed."""
+
+
+class SampleTable(np.ndarray[Any, np.dtype[np.void]]):
+    """A structured array, (n,), of float64 by column name: `table["x"]`."""
+
+    def __getitem__(self, key: Any) -> Any:
+        found = super().__getitem__(key)
+        return found.view(np.ndarray) if isinstance(found, SampleTable) and found.dtype.names is None else found
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame; PandasError if pandas is not installed."""
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise PandasError("to_pandas() needs pandas: pip install pandas") from error
+        return DataFrame({name: self[name] for name in self.dtype.names or ()})
+
+
+def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> SampleTable:
+    rows = np.concatenate([np.empty((0, len(columns))), *blocks])
+    return rows.view([(name, np.float64) for name in columns])[:, 0].view(SampleTable)
+
+
+def table_html(title: str, rows: Iterable[Sequence[str]]) -> str:
+    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
+    return f"<b>{escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+def figure_html(figure: "Figure") -> str:
+    png = BytesIO()
+    figure.savefig(png, format="png", dpi=80)
+    return f'<img src="data:image/png;base64,{b64encode(png.getvalue()).decode()}">'
 
 
 @dataclass(eq=False)

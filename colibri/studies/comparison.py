@@ -18,7 +18,7 @@ from colibri.analysis.tables import Row, comma_separated, print_table, write_tab
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Metric, Point, campaign_of
-from colibri.campaigns.engines.pool import Pool, with_bar
+from colibri.campaigns.engines import Pool, with_bar
 from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Common, FlightResult, Verdict, check, common_of, fly_points, plan_point

@@ -15,7 +15,7 @@ from colibri.analysis.tables import Row, write_table
 from colibri.autopilot.control.interface import Fallback
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
-from colibri.campaigns.engines.pool import in_order
+from colibri.campaigns.engines import in_order
 from colibri.campaigns.flights import common_of
 from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import fail

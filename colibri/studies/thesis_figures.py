@@ -8,6 +8,7 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from colibri.analysis.figure_series import POSITION, FigureSeries, Series
 from colibri.analysis.figures import (
     ANGLES,
     INPUTS,
@@ -19,8 +20,7 @@ from colibri.analysis.figures import (
     write_figure,
 )
 from colibri.analysis.outcome import keep_flight
-from colibri.analysis.series.figure_series import POSITION, FigureSeries, Series
-from colibri.campaigns.engines.pool import in_order
+from colibri.campaigns.engines import in_order
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally

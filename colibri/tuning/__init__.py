@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
+    from colibri.tuning.definition import TuningError as TuningError
     from colibri.tuning.results import TuningResults as TuningResults
     from colibri.tuning.run import tune as tune
-    from colibri.tuning.space import TuningError as TuningError
 else:
     __getattr__, __dir__ = public(__name__)

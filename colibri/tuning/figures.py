@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, round_ticks
 from colibri.campaigns.factors import Choice, LogUniform, shown
 from colibri.campaigns.figure import COLORS, make_room_for_names, scale_values
-from colibri.tuning.space import Range
+from colibri.tuning.definition import Range
 from colibri.tuning.trials import FinishedTrial
 
 _TRIED, _PRUNED, _BEST, _AS_IT_IS = "#0072B2", "#999999", "#D55E00", "#000000"

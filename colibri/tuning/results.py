@@ -12,8 +12,7 @@ from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.campaigns.factors import key_of, shown
 from colibri.campaigns.results import CampaignResults
 from colibri.common.errors import unknown
-from colibri.tuning.definition import Tuning
-from colibri.tuning.space import TuningError
+from colibri.tuning.definition import Tuning, TuningError
 from colibri.tuning.trials import FinishedTrial
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult
 from colibri.common.types import Array
-from colibri.tuning.space import SHARE_LOST, Objective, value_of
+from colibri.tuning.definition import SHARE_LOST, Objective, value_of
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
 ALL = "all"

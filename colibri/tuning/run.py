@@ -13,16 +13,15 @@ import msgspec
 import numpy as np
 
 from colibri.campaigns.definition import Point, tables_of
-from colibri.campaigns.engines.pool import Engine
+from colibri.campaigns.engines import Engine
 from colibri.campaigns.flights import Common, FlightResult, Verdict, fly_points
 from colibri.campaigns.journal import claim, identity_of
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.common.errors import checked
 from colibri.common.types import Array
-from colibri.tuning.definition import Tuning, TuningTables, tuning_of
+from colibri.tuning.definition import Tuning, TuningError, TuningTables, tuning_of
 from colibri.tuning.results import TuningResults, check_campaign, tuned_name
-from colibri.tuning.space import TuningError
 from colibri.tuning.trials import Begun, FileLock, FinishedTrial, Trials, require_optuna
 
 _WORST, _EACH = "worst", "each"

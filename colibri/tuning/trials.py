@@ -12,8 +12,7 @@ from warnings import catch_warnings, simplefilter
 from numpy.random import SeedSequence
 
 from colibri.common.files import regular
-from colibri.tuning.definition import Tuning
-from colibri.tuning.space import TuningError, as_tried, distribution
+from colibri.tuning.definition import Tuning, TuningError, as_tried, distribution
 
 if TYPE_CHECKING:
     from optuna import Study, Trial

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.common.errors import InFlightError
+from colibri.common.process.lifecycle import nudge_m
 from colibri.common.rotations import earth_from_body, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.feedback import Feedback
@@ -68,3 +69,7 @@ def default_starts(vehicle: Vehicle) -> dict[Feedback, Start]:
     """Return a hover near the thesis's spiral; on sensors the ground below, where the estimator initialises."""
     flying = Start(y=-1.0, z=2.0, psi=90.0, rotors=vehicle.hover_rpm)
     return {Feedback.STATE: flying, Feedback.SENSORS: Start(y=-1.0, psi=90.0)}
+
+
+def nudged(start: Start) -> Start:
+    return start._replace(x=start.x + nudge_m(), y=start.y + nudge_m())

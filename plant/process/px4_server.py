@@ -12,7 +12,7 @@ from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
-from colibri.plant.physics.start import Start
+from colibri.plant.physics.start import Start, nudged
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import (
@@ -25,7 +25,6 @@ from colibri.plant.process.reports import (
     report_end,
 )
 from colibri.plant.process.server import FramePacer
-from colibri.plant.process.start import nudged
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError, load_vehicle

@@ -6,11 +6,10 @@ from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink, is_bound
 from colibri.plant.events import check_events
-from colibri.plant.physics.start import default_starts
+from colibri.plant.physics.start import default_starts, nudged
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import closing
 from colibri.plant.process.server import FreeServer, Server
-from colibri.plant.process.start import nudged
 from colibri.plant.sensors.suite import served_by
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import PlantSpec

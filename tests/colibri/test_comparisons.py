@@ -13,7 +13,7 @@ from colibri.autopilot.control import loop
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.campaigns.definition import Point
-from colibri.campaigns.engines.pool import Killed, Pool
+from colibri.campaigns.engines import Killed, Pool
 from colibri.cli.main import main
 from colibri.studies.comparison import COLUMNS, contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES

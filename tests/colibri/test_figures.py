@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from colibri.analysis.figure_series import FigureSeries, Series
 from colibri.analysis.figures import (
     Curve,
     Panel,
@@ -21,7 +22,6 @@ from colibri.analysis.figures import (
     write_figure,
 )
 from colibri.analysis.recording import Recording, read_recording
-from colibri.analysis.series.figure_series import FigureSeries, Series
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec

@@ -10,6 +10,7 @@ import pytest
 from colibri.analysis.limits import KEYS, ReportLimit, exceeded
 from colibri.analysis.lost import (
     LIMIT_CYCLE_RAD_S,
+    FlightSeries,
     Lost,
     ground_contact_s,
     ground_hits,
@@ -18,7 +19,6 @@ from colibri.analysis.lost import (
     lost,
 )
 from colibri.analysis.recording import COLUMNS, Samples
-from colibri.analysis.series.flight_series import FlightSeries
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import load_vehicle

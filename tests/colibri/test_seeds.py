@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from colibri.analysis.estimation import MEASURED
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.campaigns.definition import CampaignTables, campaign_of
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines import Pool
 from colibri.campaigns.factors import shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import COLUMNS
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines import Pool
 from colibri.campaigns.flights import common_of, plan_point
 from colibri.cli.main import main
 from colibri.flights.plan import FlightPlan

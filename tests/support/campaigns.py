@@ -11,7 +11,7 @@ import numpy as np
 
 import colibri
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
-from colibri.campaigns.engines.pool import Job, Killed, Result
+from colibri.campaigns.engines import Job, Killed, Result
 from colibri.campaigns.flights import FlightResult, common_of, fly_point
 from colibri.campaigns.journal import JOURNAL
 from colibri.campaigns.results import CampaignResults

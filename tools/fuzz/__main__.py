@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from colibri.campaigns.engines.pool import in_order
+from colibri.campaigns.engines import in_order
 from colibri.common.process.arguments import seeds
 from tools.fuzz.campaign import HEADER, Job, fire
 

@@ -11,7 +11,7 @@ from colibri.analysis.estimation import rms
 from colibri.analysis.figures import GRID
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
-from colibri.campaigns.engines.pool import in_order
+from colibri.campaigns.engines import in_order
 from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.analysis.figure_series import Extremes
 from colibri.analysis.logs import RecordingError, read_blocks, read_series
 from colibri.analysis.recording import Lags, path_times, rotor_names
-from colibri.analysis.series.figure_series import Extremes
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.errors import Error

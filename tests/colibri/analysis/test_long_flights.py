@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from colibri.analysis import figure_series
 from colibri.analysis.estimation import read_estimation, rms
+from colibri.analysis.figure_series import FigureSeries
 from colibri.analysis.logs import Rows, at_times, csv_rows, log_of, read_blocks, read_series
+from colibri.analysis.lost import read_flight
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.recording import COLUMNS, FlightReader, read_recording
-from colibri.analysis.series import figure_series
-from colibri.analysis.series.figure_series import FigureSeries
-from colibri.analysis.series.flight_series import read_flight
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan, FrameCount
 from colibri.flights.spec import FlightSpec

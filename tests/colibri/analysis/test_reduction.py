@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from colibri.analysis.figure_series import MAX_PATH_POINTS, MAX_POINTS, EveryNth, Extremes
 from colibri.analysis.figures import Curve, Panel, TimeFigure, draw_times, draw_trajectory
-from colibri.analysis.series.figure_series import MAX_PATH_POINTS, MAX_POINTS, EveryNth, Extremes
 from colibri.common.types import Array
 
 HOUR = np.arange(450_000, dtype=np.float64) * 0.008

@@ -10,7 +10,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench import commands, costs, run, speed, stages
+from colibri.bench import costs, run, speed, stages
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -69,8 +69,8 @@ def test_whole_commands_alternate_with_another_checkout(tmp_path: Path) -> None:
     other.write_text(f'#!/bin/sh\nexec {sys.executable} -m colibri "$@"\n')
     other.chmod(0o700)
     options = ("--only", "commands", "--against", str(tmp_path / "other"), "--duration", "2")
-    figures = figures_of(tmp_path / "commands.json", *options)["commands"]
-    assert len(figures) == len(commands.GOALS)
+    figures = figures_of(tmp_path / "speed.json", *options)["commands"]
+    assert len(figures) == len(speed.GOALS)
     for figure in figures.values():
         assert 0.0 < figure["min"] <= figure["median"] <= figure["max"]
         assert figure["ratio"] == pytest.approx(figure["median"] / figure["other"])

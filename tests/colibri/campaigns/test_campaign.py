@@ -5,7 +5,7 @@ import psutil
 import pytest
 
 import colibri
-from colibri.campaigns.engines.pool import Killed
+from colibri.campaigns.engines import Killed
 from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.run import fly_campaign
 from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, SHORT, Here, Hovers, begin, planned, rows, tables_in

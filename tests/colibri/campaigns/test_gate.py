@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from colibri.analysis.limits import LossLimit, limit, loss_limit
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines import Pool
 from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.gate import handed_over
 from colibri.campaigns.results import CampaignResults

@@ -9,10 +9,10 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions, box_of
 from colibri.certification.certificate import ProofEntry, exactly
-from colibri.certification.flights import Interval, integrate
 from colibri.certification.loop import RangeError, UncertainLoop
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import PlannedAttitude
+from colibri.certification.report import Interval, integrate
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 

@@ -11,10 +11,9 @@ from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
 from colibri.certification.certificate import Certificate, ProofEntry
-from colibri.certification.flights import Interval, fly, integrate
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
-from colibri.certification.report import CERTIFICATE, FIGURE
+from colibri.certification.report import CERTIFICATE, FIGURE, Interval, fly, integrate
 from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle

@@ -17,8 +17,8 @@ from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
-from colibri.certification.flights import fly
 from colibri.certification.planned_attitude import PlannedAttitude
+from colibri.certification.report import fly
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Array, Quaternion

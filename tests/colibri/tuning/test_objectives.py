@@ -5,7 +5,7 @@ import pytest
 import colibri
 from colibri.campaigns.definition import Metric
 from colibri.campaigns.flights import Verdict
-from colibri.tuning.space import Objective, TuningError, metrics_of, read_objectives
+from colibri.tuning.definition import Objective, TuningError, metrics_of, read_objectives
 from tests.support.tuning import flown
 
 METRICS = (Metric("effort_n_m"), Metric("rmse_m"))

@@ -11,7 +11,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl.vehicle import Sitl
 from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
-from tools.harness.stations import ACCEPTED, HarnessStation
+from tools.soak.clients import ACCEPTED, HarnessStation
 
 DURATION = ("--duration", "6")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")

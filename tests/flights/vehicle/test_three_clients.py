@@ -7,8 +7,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import QUICK
-from tools.harness.stations import HarnessStation
-from tools.soak.clients import crew, faults
+from tools.soak.clients import HarnessStation, crew, faults
 
 pytestmark = QUICK
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.flights.spec import FlightSpec, OptionError
-from colibri.plant.environment.noise import Noise
+from colibri.plant.environment.random_streams import Noise
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.texts import noise_values

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.experiments import fly
-from colibri.experiments.table import SampleTable
+from colibri.experiments.flight import SampleTable
 from colibri.plant.vehicle.description import load_vehicle
 
 LAP_S = 6.0

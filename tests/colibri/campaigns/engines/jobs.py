@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 from time import sleep
 
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines import Pool
 
 KILLS = -1
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from colibri.campaigns.engines.cluster import Cluster
+from colibri.campaigns.engines import Cluster
 from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.run import fly_campaign
 from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, Here, begin, planned, rows, tables_in
@@ -69,7 +69,7 @@ def test_it_is_the_same_table_though_a_worker_is_killed(tmp_path: Path, cluster:
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://there"])
 def test_a_scheduler_that_nobody_runs_is_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("colibri.campaigns.engines.cluster.CONNECT_S", 0.2)
+    monkeypatch.setattr("colibri.campaigns.engines.CONNECT_S", 0.2)
     with pytest.raises(CampaignError, match=f"--dask {address}: no scheduler answers there: "):
         Cluster(address)
 
@@ -93,7 +93,7 @@ def test_without_dask_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.long
 def test_a_job_that_kills_its_workers_is_given_up(cluster: Processes) -> None:
-    from colibri.campaigns.engines.pool import Killed
+    from colibri.campaigns.engines import Killed
     from tests.colibri.campaigns.engines import jobs
 
     for _ in range(12):  # it takes four with it beside others, and four alone

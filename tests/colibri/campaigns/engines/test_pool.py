@@ -10,7 +10,7 @@ from time import monotonic, sleep
 import psutil
 import pytest
 
-from colibri.campaigns.engines.pool import Killed, Pool
+from colibri.campaigns.engines import Killed, Pool
 from tests.colibri.campaigns.engines import jobs
 
 PATIENCE_S = 120.0

@@ -4,7 +4,7 @@ from time import sleep
 
 import pytest
 
-from colibri.campaigns.engines.pool import in_order, with_bar
+from colibri.campaigns.engines import in_order, with_bar
 from colibri.campaigns.factors import CampaignError
 
 

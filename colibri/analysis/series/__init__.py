@@ -1,1 +1,0 @@
-"""Flights of any length in bounded memory."""

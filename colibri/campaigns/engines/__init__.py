@@ -1,1 +1,0 @@
-"""Engines: a pool of processes, or a Dask cluster."""
