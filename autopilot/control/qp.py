@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.types import Array
@@ -221,18 +222,20 @@ def box(n: int) -> Array:
 
 def _filled(role: str, matrix: Array) -> Any:
     """Return a matrix as CSC; a new pattern takes five times Clarabel's time, so it is cached."""
-    filled = matrix.T != 0.0
-    sparse = _pattern(role, matrix.shape, filled.tobytes())
-    sparse.data[:] = matrix.T[filled]
+    sparse, places = _pattern(role, matrix.shape, (matrix != 0.0).tobytes())
+    matrix.take(places, out=sparse.data, mode="clip")
     return sparse
 
 
 @lru_cache(maxsize=_PATTERNS)
-def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> Any:
+def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> tuple[Any, NDArray[np.intp]]:
+    """Return a matrix with ones where it is filled, and the places of its data in the dense one."""
     from scipy.sparse import csc_matrix
 
     del role  # two matrices of one pattern are two matrices
-    return csc_matrix(np.frombuffer(filled, dtype=np.bool_).reshape(shape[::-1]).T.astype(np.float64))
+    sparse = csc_matrix(np.frombuffer(filled, dtype=np.bool_).reshape(shape).astype(np.float64))
+    columns = np.repeat(np.arange(shape[1]), np.diff(sparse.indptr))
+    return sparse, sparse.indices * shape[1] + columns
 
 
 @cache

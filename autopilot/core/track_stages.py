@@ -105,14 +105,15 @@ class TrackStages:
         loop = self.loop
         acts_us = self._acts_us = now_us + self.delay.delay_us
         references = self._planner.horizon_at(acts_us - loop.lag_us, loop.control_interval_us)
-        sinks = is_below(float(references.position_enu_m[0, 2]), state)
+        sinks = is_below(references.position_enu_m.item(2), state)
         self._landing, _ = watch(self._landing, now_us, state, sinks)
         return Guidance(references, pace=Pace.CATCHING_UP)
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         assert guidance.horizon is not None, "a track has references at any time"
-        felt = VehicleState(*state[:-1], airborne=is_clear(self._landing, state, self._ground_m))
-        return self.loop.decide(now_us, felt, guidance.horizon, guidance.pace)
+        if not is_clear(self._landing, state, self._ground_m):
+            state = state._replace(airborne=False)
+        return self.loop.decide(now_us, state, guidance.horizon, guidance.pace)
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
         del known, now_us

@@ -74,14 +74,18 @@ class StateSource:
             self._estimating, self.estimate = self._make(self._interval_us), None
         self._time_us = frame.time_us
         self.sensed = frame
+        if frame.gps is not None or frame.distance is not None:
+            self._note_latest(frame)
+        self._estimating.receive(frame)
+        self.estimate = self._estimating.last
+
+    def _note_latest(self, frame: SensorFrame) -> None:
         for row in OWN_MESSAGES:
             value = getattr(frame, row.field)
             if value is not None:
                 self.latest[row.field] = value
         if frame.gps is not None:
             self._fix_us = frame.time_us
-        self._estimating.receive(frame)
-        self.estimate = self._estimating.last
 
     def state(self) -> StateFrame | None:
         if self._given is not None:

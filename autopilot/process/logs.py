@@ -52,8 +52,11 @@ class AutopilotLog:
         self._rotors = vehicle.rotors.count
         self._recorder: Recorder | None = None
         self._views: tuple[SampleBlocks, SensingBlocks] | None = None
+        self._own_beginning = b""
         if topics.for_viewers and not setup.ground:
             self._views = (SampleBlocks(self._rotors), SensingBlocks())
+            known = definitions(setup.profile_tables, vehicle, setup.system_id)
+            self._own_beginning = beginning(vehicle.name, Parameters(known).values)
         self._status_us, self._thinning = -1, Thinning()
         self._fallback: Fallback | None = None
 
@@ -90,11 +93,7 @@ class AutopilotLog:
         self._recorder = Recorder(self.topics, name, self._setup.system_id, parameters, with_battery=False)
 
     def beginning(self) -> bytes:
-        if self._recorder is not None:
-            return self._recorder.begin()
-        setup, vehicle = self._setup, self._setup.vehicle_tables
-        known = definitions(setup.profile_tables, vehicle, setup.system_id)
-        return beginning(vehicle.name, Parameters(known).values)
+        return self._own_beginning if self._recorder is None else self._recorder.begin()
 
     def write_snapshot(self, snapshot: TelemetrySnapshot) -> None:
         if self._recorder is not None:

@@ -7,6 +7,7 @@ waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a ser
 import os
 import socket
 from collections.abc import Iterable
+from contextlib import suppress
 from ipaddress import ip_address
 
 from colibri.common.types import Address
@@ -87,12 +88,26 @@ def _resolved(url: str, host: str) -> str:
 
 def _bind(sock: socket.socket, url: str, address: Address, *, listen: bool = False) -> None:
     try:
-        sock.bind(address)
+        if listen or address[1]:
+            sock.bind(address)
+        else:
+            _bind_anywhere(sock, address[0])
         if listen:
             sock.listen()
     except OSError as error:
         sock.close()
         raise LinkError(f"{url}: {error.strerror}; end the program that has this port, or name another") from error
+
+
+def _bind_anywhere(sock: socket.socket, host: str) -> None:
+    """Bind to a free port by its number: Linux takes one of its own choice away when a connection is released."""
+    while True:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((host, 0))
+            free = probe.getsockname()
+        with suppress(OSError):
+            sock.bind(free)
+            return
 
 
 def _parse(url: str, schemes: tuple[str, ...]) -> tuple[str, str, int]:

@@ -7,15 +7,13 @@ from contextlib import suppress
 from errno import EADDRINUSE
 from ipaddress import ip_address
 from select import select
-from struct import Struct
 from time import perf_counter
 
 from colibri.common.types import Address
 from colibri.mavlink.links.link import SPIN_S, Endpoint, LinkError, give_way
 
 _MAX_DATAGRAM_BYTES = 4096
-_ATTACH_FILTER, _DETACH_FILTER = 26, 27  # options of Linux's sockets
-_INSTRUCTION, _PROGRAM = Struct("=HBBI"), Struct("@HP")
+_NOBODY = bytes(16)  # an address of no family: connected to it, a socket is not connected any more
 _DATAGRAMS_AT_ONCE = 64  # limit per call, so that a continuous sender cannot stall the process
 
 
@@ -26,7 +24,7 @@ class UdpLink(Endpoint):
         super().__init__(url, target)
         sock.setblocking(False)
         self._socket = sock
-        self._connected = False
+        self._connected: Address | None = None  # saves a fifth of an exchange
         self.kept: Address | None = None
         self.spin_s = SPIN_S
         self._waited_s = 0.0
@@ -35,36 +33,34 @@ class UdpLink(Endpoint):
 
     def speak_with(self, target: Address) -> None:
         self.target = target
-        self._connected = ip_address(target[0]).is_loopback
-        if self._connected:  # saves a fifth of an exchange; other routes may change
-            self._socket.connect(target)
+        if ip_address(target[0]).is_loopback:  # other routes may change
+            self._connect(target)
         self._opened = [target]
 
     def keep_to(self, peer: Address) -> None:
-        """Have Linux drop other ports' datagrams, so that no flood delays the peer's."""
+        """Have Linux drop what others send, so that no flood delays the peer's datagrams."""
         self.kept = peer
         if sys.platform == "linux":
-            load_port, is_peers = (0x28, 0, 0, 0), (0x15, 0, 1, peer[1])
-            accept, drop = (0x06, 0, 0, 0xFFFFFFFF), (0x06, 0, 0, 0)
-            code = b"".join(_INSTRUCTION.pack(*each) for each in (load_port, is_peers, accept, drop))
-            memory = ctypes.create_string_buffer(code, len(code))
-            program = _PROGRAM.pack(4, ctypes.addressof(memory))
             with suppress(OSError):
-                self._socket.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, program)
+                self._connect(peer)
 
     def release(self) -> None:
         """Receive from everybody again."""
         self.kept = None
-        if sys.platform == "linux":
-            with suppress(OSError):
-                self._socket.setsockopt(socket.SOL_SOCKET, _DETACH_FILTER, 0)
+        if self._connected is not None:
+            self._connected = None
+            ctypes.CDLL(None).connect(self._socket.fileno(), _NOBODY, len(_NOBODY))
+
+    def _connect(self, peer: Address) -> None:
+        self._socket.connect(peer)
+        self._connected = peer
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send or lose the datagram; raise `LinkError` if the target is unreachable."""
         destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
         try:
-            if self._connected and destination == self.target:
+            if destination == self._connected:
                 self._socket.send(datagram)
             else:
                 self._socket.sendto(datagram, destination)
@@ -111,17 +107,16 @@ class UdpLink(Endpoint):
 
     def _receive_now(self) -> tuple[bytes, Address] | None:
         try:
-            datagram, sender = self._take()
+            if self._connected is not None:
+                return self._socket.recv(_MAX_DATAGRAM_BYTES), self._connected
+            datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
         except (BlockingIOError, ConnectionRefusedError):
             return None
-        if self.target is not None and sender != self.target:
-            return None
-        return datagram, sender
+        return (datagram, sender) if self.target is None or sender == self.target else None
 
     def _take(self) -> tuple[bytes, Address]:
-        if self._connected:
-            assert self.target is not None, "only with a target is a socket connected"
-            return self._socket.recv(_MAX_DATAGRAM_BYTES), self.target
+        if self._connected is not None:
+            return self._socket.recv(_MAX_DATAGRAM_BYTES), self._connected
         return self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
 
 

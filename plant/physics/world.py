@@ -72,6 +72,11 @@ class Physics:
         self._power: list[float] = self._parameters["power"][0].tolist()
         self._idle, self._top, self._battery = vehicle.rotors.idle_speed, vehicle.rotors.max_speed, vehicle.battery
 
+    @property
+    def is_steady(self) -> bool:
+        """Whether neither air nor noise changes from step to step."""
+        return self._air.steady is not None and self._noise is None
+
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
         time_us, wind = world.time_us, self._air.steady

@@ -62,6 +62,7 @@ class Server:
         self._logged: World | None = None
         self._ends = True
         self._progress, self._began_s = Progress(status), 0.0
+        self._silence = Silence(status, SILENT_AFTER_S, "the autopilot answers again", 0.0)
 
     def wait(self) -> bool:
         while not self._stop and self._end.peer is None:
@@ -111,21 +112,21 @@ class Server:
         self._log_traffic(sent)
         self._log(world)
         self._progress.report(world.time_us / 1e6, now_s - self._began_s)
+        plant.foresee()
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
         """Send a frame until its answer comes; None if a signal comes first."""
-        due_s = now_s = self._offer(plant)
-        silence = Silence(self._status, SILENT_AFTER_S, "the autopilot answers again", now_s)
+        due_s = self._offer(plant)
+        self._silence.end(due_s)
         while not self._stop:
             command = self._receive(min(max(0.0, due_s - perf_counter()), MAX_WAIT_S))
-            now_s = perf_counter()
             if command is not None:
-                silence.end(now_s)
                 return command
+            now_s = perf_counter()
             due_s = self._end.poll(now_s)
             self._send_and_log()
-            silence.lasts(now_s, "no answer", plant.world.time_us, ", waiting for the autopilot")
+            self._silence.lasts(now_s, "no answer", plant.world.time_us, ", waiting for the autopilot")
         return None
 
     def _log(self, world: World) -> None:
@@ -152,11 +153,12 @@ class Server:
                 link.release()
             return None
         command = end.receive(*received, perf_counter())
-        if link.kept is None and received[1] == end.peer:
-            link.keep_to(received[1])
-        if end.notes:
-            self._status.say("said", end.notes.pop())
-        self._send_and_log()
+        if command is None or link.kept is None:
+            if link.kept is None and received[1] == end.peer:
+                link.keep_to(received[1])
+            if end.notes:
+                self._status.say("said", end.notes.pop())
+            self._send_and_log()
         return command
 
     def _send(self) -> list[PlantDatagram]:

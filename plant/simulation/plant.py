@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, judged
@@ -15,7 +16,7 @@ from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.environment.weather import RecordedWind, Wind
 from colibri.plant.events import Event, changes_of, check_events, equipment
 from colibri.plant.physics.integrators import Integrator
-from colibri.plant.physics.start import Start
+from colibri.plant.physics.start import IntegrationError, Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.sensors.faults import SensorFaults
 from colibri.plant.sensors.suite import SensorSuite
@@ -70,7 +71,7 @@ class DelayedCommands:
     """Delayed commands: the rotors follow the last one that has arrived, also between two frames."""
 
     def __init__(self, first: ActuatorCommand) -> None:
-        self._now = first
+        self.now = first
         self.delay_us: int | None = None
         self._coming: deque[tuple[int, ActuatorCommand]] = deque()
 
@@ -81,10 +82,10 @@ class DelayedCommands:
         coming, spans = self._coming, []
         while begin_us < end_us:
             while coming and coming[0][0] <= begin_us:
-                from_us, self._now = coming.popleft()
-                self.delay_us = from_us - self._now.time_us
+                from_us, self.now = coming.popleft()
+                self.delay_us = from_us - self.now.time_us
             until_us = min(end_us, coming[0][0]) if coming else end_us
-            spans.append((self._now, until_us - begin_us))
+            spans.append((self.now, until_us - begin_us))
             begin_us = until_us
         return spans
 
@@ -124,6 +125,9 @@ class Plant:
         self._actuation = DelayedCommands(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
+        self._may_foresee = latency_us == 0 and physics.is_steady
+        self._repeated, self._repeats_after = False, {False: False, True: False}
+        self._foreseen: World | None = None
 
     def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
         battery = self._physics.battery(self.world) if with_battery else None
@@ -136,11 +140,24 @@ class Plant:
         self._results = ()
         if faults:
             self.inject(faults)
-        self.arrive(self.world.time_us, command)
-        self.go_on()
+        before, foreseen, self._foreseen = self._actuation.now, self._foreseen, None
+        repeated = command.controls == before.controls and command.armed == before.armed
+        self._repeats_after[self._repeated] = self._repeated = repeated
+        if foreseen is not None and repeated:
+            self._actuation.now, self.world = command, foreseen
+        else:
+            self.arrive(self.world.time_us, command)
+            self.go_on()
+
+    def foresee(self) -> None:
+        """Integrate the next frame before its command comes, if that is likely to repeat the last one."""
+        if self._repeats_after[self._repeated] and self.world.time_us < self._next_us and self._may_foresee:
+            with suppress(IntegrationError):
+                self._foreseen = self._physics.step(self.world, self._actuation.now, self.interval_us)
 
     def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
         """Inject faults and changes of the world now; results of faults go with the next frame."""
+        self._foreseen = None
         results = map(self._change, asked)
         self._results = tuple(result for result in results if result is not None)
 
@@ -166,6 +183,7 @@ class Plant:
 
     def become(self, vehicle: Vehicle, seed: int) -> None:
         """Go on as a vehicle with the same sensors, and with other noise."""
+        self._foreseen = None
         self._physics.become(vehicle)
         if self._suite is not None:
             self._suite.reseed(seed)

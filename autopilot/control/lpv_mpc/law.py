@@ -217,13 +217,11 @@ class LpvMpc(TrackingLaw[LawMemory]):
     def _decide(
         self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool = True
     ) -> tuple[LawMemory, Decision]:
-        squared, plan, age, diagnostics = self._choose(memory, inputs, wanted, on_track=on_track)
+        squared, plan, age, how = self._choose(memory, inputs, wanted, on_track=on_track)
         tracked, observed = memory.tracked, inputs.observed
         commands, after = self.tracker.actuate(tracked, observed, squared)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
         phi, theta, psi = planning.first_angles(wanted.target)
-        path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
-        how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
         memory = LawMemory(after, plan, age, lag_us, wanted.deviation)
         return memory, Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
 
@@ -237,14 +235,17 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         target, force, path, _ = wanted
+        mass_kg, path_lag_s = inputs.observed.mass_kg, memory.lag_us * 1e-6 if path else nan
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
-            return self._recover(inputs, force, Diagnostics())
+            return self._recover(inputs, force, Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s))
         if self._force.upright or not inputs.airborne:
             most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
             planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None
-        plan, diagnostics = self._mpc.plan(self._now, target, last, inputs.psi, path, on_track=on_track)
+        plan, diagnostics = self._mpc.plan(
+            self._now, target, last, inputs.psi, path, on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s
+        )
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):

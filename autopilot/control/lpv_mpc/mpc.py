@@ -1,6 +1,6 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
-from math import inf, radians
+from math import inf, nan, radians
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -181,6 +181,8 @@ class Mpc:
         path: PathNow | None = None,  # if the speed is free
         *,
         on_track: bool = True,  # else track attitude and thrust
+        mass_kg: float = nan,  # for the diagnostics, as is the lag
+        path_lag_s: float = nan,
     ) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; the plan is None if the QP is not solved."""
         qps = self._on_path if path else self._on_clock if on_track else self._on_hold
@@ -193,19 +195,15 @@ class Mpc:
         status, z, iterations, slack, soft = self.solve(*qps)
         solve_time_s = self._clock() - started_s
         if z is None:
-            return None, Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations)
+            unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
+            return None, unsolved._replace(qp_iterations=iterations)
         rotors = self._none.shape[1]
         commands = np.empty((self.horizon, rotors))
         states = np.empty((self.horizon + 1, condensing.PREDICTED + rotors))
         binding = planning.read(qps.kind, z, psi, commands, states)
+        active = Active(binding, 0, *soft)
         diagnostics = Diagnostics(
-            QpStatus.SOLVED,
-            solve_time_s=solve_time_s,
-            active=Active(binding, 0, *soft),
-            slack=slack,
-            predicted=states,
-            planned_squared=commands,
-            qp_iterations=iterations,
+            status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics

@@ -39,9 +39,10 @@ class IncrementModel(NamedTuple):
 
 def augment(transition: Array, C: Array) -> IncrementModel:
     """Return the increment model; the transition [[Ad, Bd], [0, I]] is Ã, and its last m columns are B̃."""
-    outputs, n = C.shape
-    inputs = len(transition) - n
-    return IncrementModel(transition, transition[:, n:], np.hstack([C, np.zeros((outputs, inputs))]))
+    n = C.shape[1]
+    outputs = np.zeros((len(C), len(transition)))
+    outputs[:, :n] = C
+    return IncrementModel(transition, transition[:, n:], outputs)
 
 
 def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:

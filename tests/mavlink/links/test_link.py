@@ -126,7 +126,7 @@ def test_an_address_is_bound_while_its_socket_is_open(server: UdpLink) -> None:
     assert not is_bound(("192.0.2.1", 14550))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="filters of sockets are Linux's")
+@pytest.mark.skipif(sys.platform != "linux", reason="sockets are connected to a caller on Linux only")
 def test_a_link_kept_to_a_peer_drops_what_others_send(server: UdpLink) -> None:
     with closing(client_of(server)) as peer, closing(client_of(server)) as stranger:
         peer.send(b"peer")
@@ -139,5 +139,6 @@ def test_a_link_kept_to_a_peer_drops_what_others_send(server: UdpLink) -> None:
             assert server.receive(1.0) == (b"again", received[1])
             assert server.receive(0.0) is None
             server.release()
-            stranger.send(b"call")
+            for _ in range(2):  # the first meets the refusal of the one before
+                stranger.send(b"call")
             assert server.receive_now()[0][0] == b"call"
