@@ -47,6 +47,7 @@ class Served(Protocol):
     def say(self, severity: int, text: str) -> None: ...
 
 
+PLACES = ("HOME_POSITION", "GPS_GLOBAL_ORIGIN")
 Rewrite: TypeAlias = Callable[[str], str]
 """Returns a status text in the words of the emulated program; empty if it sends none."""
 

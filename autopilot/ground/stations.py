@@ -13,7 +13,7 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.status_queue import StatusQueue
-from colibri.autopilot.ground.conventions import Conventions
+from colibri.autopilot.ground.conventions import PLACES, Conventions
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, LoggedVehicle, OnboardLog
 from colibri.autopilot.ground.system_commands import SystemCommands
@@ -47,7 +47,8 @@ from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES, Offboard
 from colibri.mavlink.setpoints.radio import Radio
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
-from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
+from colibri.mavlink.telemetry.encoder import Encoder
+from colibri.mavlink.telemetry.snapshot import HomePosition, TelemetrySnapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
@@ -86,6 +87,11 @@ def home_item(home: Home) -> MissionItem:
     place = geodetic_of(home.position_enu_m, home.origin)
     x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
     return MissionItem(mav.MAV_FRAME_GLOBAL, mav.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, x, y, place.altitude_m)
+
+
+def _at_home(encoder: Encoder, home: Home) -> Encoder:
+    """Return an encoder by home and origin as they are, not as of the last frame."""
+    return lambda s: encoder(s._replace(origin=home.origin, home=HomePosition(home.position_enu_m, home.yaw_rad)))
 
 
 class Guarding(Protocol):
@@ -146,6 +152,7 @@ class Stations:
         encoders = streams.chosen(telemetry(settings.boot_unix_us))
         if not wire.streams_current:
             encoders["MISSION_CURRENT"] = lambda _: self.plans.current()
+            encoders |= {name: _at_home(encoders[name], pilot.home) for name in PLACES}
         self.streams = StreamService(encoders, streams)
         modes = StandardModes(
             [ModeInfo(each.name, each.number, each.standard, each.selectable) for each in book.modes if each.flies],

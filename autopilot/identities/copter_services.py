@@ -1,11 +1,10 @@
 """Services of ArduCopter: texts, version, stream rates, radio switches, simulation."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from math import radians
 
 from colibri.autopilot.commander.copter_motion import AUTO
-from colibri.autopilot.ground.conventions import Served
+from colibri.autopilot.ground.conventions import PLACES, Served
 from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.kernels import cos
@@ -15,11 +14,7 @@ from colibri.mavlink.hil.world_changes import PaceChange, WindChange, WorldChang
 from colibri.mavlink.mission.items import MISSION, MissionItem
 from colibri.mavlink.node.service import Peer, Send, Service, to
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import ReceivedCommand
 from colibri.mavlink.services.statustext import CRITICAL, INFO, WARNING
-from colibri.mavlink.telemetry.encoder import Encoder, fitted
-from colibri.mavlink.telemetry.position import gps_global_origin, home_position
-from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
@@ -37,7 +32,6 @@ _FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
 _SAVES_WAYPOINT, _RESETS_MISSION, _CLEARS_MISSION = 7, 24, 58
 _LOW, _MIDDLE, _HIGH = _LEVELS = (0, 1, 2)
 _M_PER_DEG = 111_319.5
-_PLACES: Mapping[str, Encoder] = {"HOME_POSITION": home_position, "GPS_GLOBAL_ORIGIN": gps_global_origin}
 _STREAMS = {
     "RAW_SENS": mav.MAV_DATA_STREAM_RAW_SENSORS,
     "EXT_STAT": mav.MAV_DATA_STREAM_EXTENDED_STATUS,
@@ -104,24 +98,15 @@ class Polled:
 
 
 class Places(Polled):
-    """Reports home and origin at arming, when they change, and on request without a frame's delay."""
+    """Reports home and origin at arming, and when they change."""
 
     def __init__(self, served: Served) -> None:
         super().__init__(served)
-        self._encoders = {name: fitted(name, encoder) for name, encoder in _PLACES.items()}
         self._shown = self._place()
-        for name in _PLACES:
-            served.streams.provide(name, partial(self._answer, name))
 
-    def _answer(self, name: str, command: ReceivedCommand) -> list[Send]:
-        return [send._replace(channel=command.peer.channel) for send in self._sends(name)]
-
-    def _sends(self, *names: str) -> list[Send]:
-        snapshot, home = self._served.snapshot, self._served.pilot.home
-        if snapshot is None:
-            return []
-        snapshot = snapshot._replace(origin=home.origin, home=HomePosition(home.position_enu_m, home.yaw_rad))
-        return [Send(name, fields) for name in names if isinstance(fields := self._encoders[name](snapshot), tuple)]
+    def _place(self) -> tuple[Vector, Geodetic, int]:
+        pilot = self._served.pilot
+        return (pilot.home.position_enu_m, pilot.home.origin, pilot.ground.times.flights)
 
     def poll(self, now_us: int) -> Iterable[Send]:
         del now_us
@@ -129,11 +114,7 @@ class Places(Polled):
         if place == self._shown:
             return ()
         self._shown = place
-        return self._sends(*_PLACES)
-
-    def _place(self) -> tuple[Vector, Geodetic, int]:
-        pilot = self._served.pilot
-        return (pilot.home.position_enu_m, pilot.home.origin, pilot.ground.times.flights)
+        return [Send(name, fields) for name in PLACES for fields in self._served.streams.encode(name)]
 
 
 class Requests:

@@ -107,7 +107,7 @@ class StreamService:
             return ()
         sends, self._waiting = self._waiting, []
         for channel, name in due:
-            sends.extend([Send(name, fields, channel) for fields in self._encode(name)])
+            sends.extend([Send(name, fields, channel) for fields in self.encode(name)])
         return sends
 
     def handlers(self) -> dict[int, Handler]:
@@ -162,7 +162,7 @@ class StreamService:
         name = self._names.get(message_id)
         if name is None:
             return Refusal(f"request refused: {_named(message_id, command.p1)} is not sent", self._streams.unsent)
-        sends = [to(command.peer, name, *fields) for fields in self._encode(name)]
+        sends = [to(command.peer, name, *fields) for fields in self.encode(name)]
         return self._post(sends) if sends else Refusal(f"{name} is not known yet", TEMPORARILY_REJECTED)
 
     def _post(self, sends: list[Send]) -> Refusal | None:
@@ -171,7 +171,8 @@ class StreamService:
         self._waiting.extend(sends)
         return None
 
-    def _encode(self, name: str) -> list[Fields]:
+    def encode(self, name: str) -> list[Fields]:
+        """Return the fields of a message by the latest snapshot; none before the first."""
         encoded = self._encoded.get(name)
         if encoded is None:
             fields = None if self._snapshot is None else self._telemetry[name](self._snapshot)
