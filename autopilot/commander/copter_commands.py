@@ -37,9 +37,7 @@ _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
 _TESTED_MOTORS = range(1, 9)
-_KEEPS = 76.0
-_CALIBRATED = (1.0, 2.0, 4.0, _KEEPS)
-"""Parameter 5 of PREFLIGHT_CALIBRATION: accelerometer, level, accelerometer at rest, the present values."""
+_CALIBRATED = (1.0, 2.0, 4.0, 76.0)  # accelerometer, level, accelerometer at rest, the present values
 _ACCEPTED = (
     *(mav.MAV_CMD_DO_SET_RELAY, mav.MAV_CMD_DO_REPEAT_SERVO, mav.MAV_CMD_DO_REPEAT_RELAY, mav.MAV_CMD_DO_SET_ROI),
     *(mav.MAV_CMD_DO_SET_ROI_LOCATION, mav.MAV_CMD_DO_SET_ROI_NONE, mav.MAV_CMD_DO_MOUNT_CONTROL),
@@ -206,7 +204,7 @@ class CopterCommands(Commands):
         if command.p3 == 1.0:
             self._pilot.say(INFO, "Updating barometer calibration")
             self._pilot.say(INFO, "Barometer calibration complete")
-        elif command.p1 != 1.0 and command.x not in _CALIBRATED and command.p2 != _KEEPS:
+        elif command.p1 != 1.0 and command.x not in _CALIBRATED and command.p2 != _CALIBRATED[-1]:
             return Refusal("calibration refused: only gyro, pressure, accel and level are known", UNSUPPORTED)
         return None
 

@@ -26,7 +26,6 @@ _LINK_ACTIONS = {0: 0, 1: 2, 2: 2, 3: 2, 4: 2, 5: 3, 6: 2, 7: 1}
 _TOTALS = {MISSION: ("MIS_TOTAL", 1), FENCE: ("FENCE_TOTAL", 0), RALLY: ("RALLY_TOTAL", 0)}
 _MAX_TOTALS = {MISSION: 32_767, FENCE: 127, RALLY: 127}
 _LINK_ACTIONS_BACK = {0: 0, 1: 7, 2: 1, 3: 5, 5: 5}
-_GPS_LOST_LANDS = 3
 _OURS_FROM_THE_START: Mapping[str, Value] = {"MPC_XY_VEL_MAX": 25.0, "COM_DISARM_LAND": 1.0, "COM_GNSSLOSS_T": 10.0} | {
     name: 0.0 for name in ("RTL_MIN_DIST", "BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
 }
@@ -88,7 +87,7 @@ class ParameterLinks:
         elif "NAV_DLL_ACT" in changes:
             found["FS_GCS_ENABLE"] = _LINK_ACTIONS_BACK.get(int(changes["NAV_DLL_ACT"]), 1)
         if "FS_EKF_ACTION" in changes:
-            found["COM_GNSSLOSS_ACT"] = _GPS_LOST_LANDS if changes["FS_EKF_ACTION"] else 0
+            found["COM_GNSSLOSS_ACT"] = 3 if changes["FS_EKF_ACTION"] else 0
         if "FS_THR_ENABLE" in changes:
             wanted = int(changes["FS_THR_ENABLE"])
             found["NAV_RCL_ACT"] = 3 if wanted == 3 else max(_LINK_ACTIONS.get(wanted, 2), 1)

@@ -63,9 +63,7 @@ class Greeter:
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         del now_us
-        texts: tuple[str, ...] = ()
-        if message.name == "PARAM_REQUEST_LIST":
-            texts = self._served.banner
+        texts = self._served.banner if message.name == "PARAM_REQUEST_LIST" else ()
         if peer not in self._met:
             self._met.add(peer)
             self._new.append(peer.channel)
