@@ -8,6 +8,7 @@ from math import isnan, radians
 
 from colibri.autopilot.commander.commands import FORCE_MAGIC, Commanded, Commands
 from colibri.autopilot.commander.copter_motion import ALT_HOLD, AUTO, CIRCLE, LOITER, POSHOLD, CopterMotion
+from colibri.autopilot.commander.mode_selection import THROTTLE_UP
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
@@ -60,6 +61,7 @@ class CopterCommands(Commands):
         self.modes.starts_armed = lambda: bool(int(parameters["AUTO_OPTIONS"]) & _WITHOUT_THROTTLE)
         self.taken, self.exempt = self.motion.setpoint, self._exempt
         pilot.readiness.further = self._prearm
+        pilot.stays_armed = self._throttle_raised
         self.modes.select(int(parameters["INITIAL_MODE"]))
 
     def _guided_settings(self) -> GuidedSettings:
@@ -86,6 +88,10 @@ class CopterCommands(Commands):
         if self.modes.shown.number in _WITHOUT_POSITION and value["FS_EKF_ACTION"] != _LANDS_ALWAYS:
             exempt[Condition.GPS_LOST] = self.modes.shown.name
         return exempt
+
+    def _throttle_raised(self) -> bool:
+        sticks = self._pilot.sensed.steered.sticks
+        return sticks is not None and sticks.thrust > THROTTLE_UP
 
     def _prearm(self) -> Iterator[str]:
         """Yield the reasons of ArduCopter's own arming checks."""

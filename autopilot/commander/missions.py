@@ -1,6 +1,7 @@
 """Uploaded plans, and the task that flies a mission."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from math import dist, hypot
 
 from colibri.autopilot.commander.fence import CHECKED_AT_ONCE, Fence
@@ -17,7 +18,7 @@ from colibri.autopilot.guidance.mission.executor import (
     MissionRecord,
     Reached,
 )
-from colibri.autopilot.guidance.mission.items import places, rally_places
+from colibri.autopilot.guidance.mission.items import COPTERS_MAX_HEIGHT_M, places, rally_places
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
@@ -29,7 +30,7 @@ from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, St
 from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.places import far, too_far
+from colibri.mavlink.wire.places import MAX_HEIGHT_M, far, too_far
 from colibri.mavlink.wire.refusal import Refusal
 
 _PLACE_US = 2.0
@@ -48,7 +49,6 @@ class Missions:
         unmet: Unmet needs of mode mission, with reasons.
         checking: Whether `check_on` is due, as a long mission takes several frames.
         boot_unix_us: Unix time at simulated time 0, if items may name a time of day; else 0.
-        copter: Whether heights of 0 keep the height, and take-offs may be to below the ground, as with ArduCopter.
         functions: Functions of items, to carry out and remove.
     """
 
@@ -65,7 +65,7 @@ class Missions:
         self._found: list[tuple[int, Vector]] = []
         self._checked = 0
         self._reached: list[int] = []
-        self.boot_unix_us, self.copter = 0, False
+        self.boot_unix_us = 0
         self.functions: list[AuxFunction] = []
         self.changes = 0
 
@@ -76,6 +76,10 @@ class Missions:
     def adopt(self, behaviour: Behaviour) -> None:
         self._behaviour = behaviour
         self._fence.adopt(behaviour)
+
+    @property
+    def _max_height_m(self) -> float:
+        return COPTERS_MAX_HEIGHT_M if self._behaviour.copter_items else MAX_HEIGHT_M
 
     def progress(self) -> MissionProgress:
         return self._executor.progress
@@ -121,12 +125,12 @@ class Missions:
 
     def homeward(self, context: TaskContext, *, tells: bool = True) -> TaskSequence:
         """Return to the nearest of home and the rally points inside the fence."""
-        places = [context.home_enu_m]
-        for _, place in rally_places(self._rally, context.home_enu_m, self._home.origin):
-            if not self._rally_fault(place):
-                places.append(place)
+        home, rally = context.home_enu_m, rally_places(self._rally, context.home_enu_m, self._home.origin)
+        places = [place for _, place in rally if not self._rally_fault(place)]
+        if not (places and self._behaviour.rally_only):
+            places.insert(0, home)
         nearest = min(places, key=lambda place: dist(place[:2], context.place[:2]))
-        if tells and nearest is not places[0]:
+        if tells and nearest is not home:
             self._lines.say(INFO, "returning to a rally point")
         return homeward(context, nearest)
 
@@ -139,7 +143,11 @@ class Missions:
         behaviour = self._behaviour
         acceptance_m = max(behaviour.acceptance_m, 0.1)
         self._executor.defaults = Defaults(
-            acceptance_m, behaviour.takeoff_height_m, behaviour.orbit_radius_m, behaviour.items_face, self.copter
+            acceptance_m,
+            behaviour.takeoff_height_m,
+            behaviour.orbit_radius_m,
+            behaviour.items_face,
+            behaviour.copter_items,
         )
         return MissionTask(self._executor, self, turns, legs)
 
@@ -215,10 +223,10 @@ class Missions:
         """Report bad items; `outside` names one outside the fence."""
         home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
-        without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if self.copter else _ON_THE_GROUND
+        without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if self._behaviour.copter_items else _ON_THE_GROUND
         flown = [each for each in found if items[each[0]].command not in without]
         reasons = {
-            Need.WITHIN_REACH: _first(found, too_far),
+            Need.WITHIN_REACH: _first(found, partial(too_far, max_height_m=self._max_height_m)),
             Need.INSIDE_FENCE: outside,
             Need.ABOVE_GROUND: _first(flown, lambda place: (home.refusal(place[2]) or _NONE).reason),
         }

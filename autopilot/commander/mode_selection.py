@@ -10,7 +10,7 @@ from colibri.autopilot.commander.rules.shown_modes import ModeBook, ShownMode
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.refusal import Refusal
 
-_THROTTLE_UP = 0.1
+THROTTLE_UP = 0.1
 """Of the stick's way; it starts a mission that waits."""
 
 
@@ -51,7 +51,7 @@ class ModeSelection:
             self._follow(pilot)
         if self._waits:
             sticks = pilot.sensed.steered.sticks
-            raised = sticks is not None and sticks.thrust > _THROTTLE_UP
+            raised = sticks is not None and sticks.thrust > THROTTLE_UP
             if pilot.state.armed and (raised or self.starts_armed()):
                 self.start()
 

@@ -96,6 +96,7 @@ class Pilot:
 
     Attributes:
         speed_m_s: Requested cruise speed; None for the parameters'.
+        stays_armed: Whether the vehicle stays armed on the ground beyond its time.
         saving: Active failsafe, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
     """
@@ -117,6 +118,7 @@ class Pilot:
         self.wanted: TaskOutput | None = None
         self._task_is_chosen = False
         self.speed_m_s: float | None = None
+        self.stays_armed: Callable[[], bool] = lambda: False
         self.saving = Action.NONE
         self.terminated = False
 
@@ -339,7 +341,7 @@ class Pilot:
     def _idle(self) -> Guidance:
         self._rest()
         event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
-        if event is not None:
+        if event is not None and not (event is Event.LEFT_STANDING and self.stays_armed()):
             self._stop_rotors(event, self._end(event))
         return RESTS
 

@@ -143,7 +143,7 @@ class Stations:
         rules = {MISSION: conventions.mission_rules, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
         vehicle = MissionVehicle(self._load, missions.progress, missions.set_current, commands.motion.guided_goto)
         if wire.home_first:
-            missions.boot_unix_us, missions.copter = settings.boot_unix_us, True
+            missions.boot_unix_us = settings.boot_unix_us
             vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
         self.plans = MissionService(
             rules, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None

@@ -16,7 +16,9 @@ class Behaviour:
 
     An identity sets those from `return_delay_s` on: a return waits above home for `return_delay_s`, ends
     `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`.
-    By `items_face`, items of missions face their way or keep the heading; if None, each has its yaw.
+    By `items_face`, items of missions face their way or keep the heading; if None, each has its yaw. With
+    `copter_items`, their heights of 0 keep the height, and take-offs may be to below the ground. With `rally_only`,
+    rally points replace home. By `hover_throttle`, 0..1, the throttle stick has ArduCopter's curve.
     Landings are slow below `land_slow_below_m`.
     """
 
@@ -54,6 +56,9 @@ class Behaviour:
     return_climb_m: float = 0.0
     return_faces: bool = True
     items_face: bool | None = None
+    copter_items: bool = False
+    rally_only: bool = False
+    hover_throttle: float = 0.0
     land_high_m_s: float = 0.0
     land_slow_below_m: float = 0.0
     stick_climb_m_s: float = 0.0

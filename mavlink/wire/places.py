@@ -32,13 +32,13 @@ def misplaced_height(altitude_m: float) -> str:
     return "" if abs(altitude_m) <= MAX_HEIGHT_M else f"altitude {altitude_m:g} is not within {MAX_HEIGHT_M:g} m"
 
 
-def too_far(place: Vector) -> str:
+def too_far(place: Vector, max_height_m: float = MAX_HEIGHT_M) -> str:
     """Return the distance of a place beyond the limit, and the limit, or ""."""
     east, north, up = place
     away_m = hypot(east, north)
     if not away_m <= MAX_DISTANCE_M:
         return f"{away_m / 1000.0:.0f} km away, more than {MAX_DISTANCE_M / 1000.0:.0f}"
-    return "" if abs(up) < MAX_HEIGHT_M else f"{up:.0f} m high, more than {MAX_HEIGHT_M:.0f}"
+    return "" if abs(up) < max_height_m else f"{up:.0f} m high, more than {max_height_m:.0f}"
 
 
 def far(place: Vector, other: Vector) -> str:

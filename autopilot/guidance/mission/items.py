@@ -83,12 +83,12 @@ _COPTERS: Mapping[int, _Allowed] = {
     mav.MAV_CMD_NAV_DELAY: _Allowed(p1=isfinite),
     DO_AUX_FUNCTION: _Allowed(p1=_whole(0, 0xFFFF), p2=_one_of(0.0, 1.0, 2.0)),
 }
-_COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h
+COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h
 
 
 def check_copter_item(item: MissionItem) -> int:
     """Check an item as ArduCopter: a place of 0, 0 is where the vehicle is going."""
-    return check_item(item, _COPTERS, _COPTERS_MAX_HEIGHT_M)
+    return check_item(item, _COPTERS, COPTERS_MAX_HEIGHT_M)
 
 
 def check_item(item: MissionItem, table: Mapping[int, _Allowed] = _ALLOWED, max_height_m: float = MAX_HEIGHT_M) -> int:

@@ -31,7 +31,7 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Numbers for items that leave them out; `face` is as `Behaviour.items_face`, `copter` as `Missions.copter`."""
+    """Numbers for items that leave them out; `face` is as `Behaviour.items_face`, `copter` as `copter_items`."""
 
     acceptance_m: float = 0.5
     takeoff_height_m: float = 2.5

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from colibri.autopilot.guidance.attitude_reference import AttitudeReference, ReferenceMemory, tilt_command
+from colibri.autopilot.guidance.attitude_reference import STICK_MIDDLE, AttitudeReference, ReferenceMemory, tilt_command
 from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, lead, moving_with, still_target
@@ -48,7 +48,18 @@ class StabilizedTask(EndlessTask):
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
-        return self._tilt.by_command(self._tilt.generator.from_sticks(without_play(sticks)), context)
+        generator, hover = self._tilt.generator, context.behaviour.hover_throttle
+        command = generator.from_sticks(without_play(sticks))
+        if hover:
+            thrust_n = generator.weight_n * copter_throttle(sticks.thrust, hover) / hover
+            command = command._replace(thrust_n=min(thrust_n, generator.max_thrust_n))
+        return self._tilt.by_command(command, context)
+
+
+def copter_throttle(stick: float, hover: float) -> float:
+    """Return ArduCopter's throttle, 0..1, which is `hover` at half the stick: Mode::get_pilot_desired_throttle."""
+    bend = min(max((STICK_MIDDLE - hover) / 0.375, -0.5), 1.0)
+    return stick * (1.0 - bend + bend * stick * stick)
 
 
 class AltitudeTask(EndlessTask):

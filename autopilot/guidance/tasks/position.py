@@ -236,13 +236,13 @@ def homeward(context: TaskContext, place: Vector) -> TaskSequence:
 def _homeward_in_steps(context: TaskContext, place: Vector) -> TaskSequence:
     """Climb within a cone, fly home, wait there, land or stay: ArduCopter's mode_rtl.cpp."""
     x, y, z = place
-    behaviour, (east, north, up) = context.behaviour, context.place
-    away_m, high_m = hypot(x - east, y - north), z + behaviour.return_height_m
+    behaviour, (east, north, up), home_m = context.behaviour, context.place, context.home_enu_m[2]
+    away_m, high_m = hypot(x - east, y - north), max(z, home_m + behaviour.return_height_m)
     high_m = max(high_m, up + behaviour.return_climb_m)
     if behaviour.return_cone:
-        high_m = max(up, min(high_m, max(z + away_m * behaviour.return_cone, up + _LEAST_CLIMB_M)))
+        high_m = max(up, min(high_m, max(home_m + away_m * behaviour.return_cone, up + _LEAST_CLIMB_M)))
     if behaviour.max_height_m > 0.0:
-        high_m = max(up, min(high_m, context.home_enu_m[2] + _BELOW_FENCE * behaviour.max_height_m))
+        high_m = max(up, min(high_m, home_m + _BELOW_FENCE * behaviour.max_height_m))
     speed = behaviour.return_speed_m_s or None
     outward = atan2(y - north, x - east) if behaviour.return_faces and away_m > _ALONG_BEYOND_M else None
     there, home_yaw = (x, y, high_m), context.home_yaw_rad
@@ -251,7 +251,9 @@ def _homeward_in_steps(context: TaskContext, place: Vector) -> TaskSequence:
         lambda begin: GoToTask(GoTo(there, home_yaw, speed, stay_s=behaviour.return_delay_s), begin),
     ]
     if behaviour.return_final_m > 0.0:
-        legs.append(lambda begin: GoToTask(GoTo((x, y, z + behaviour.return_final_m), home_yaw, stay_s=inf), begin))
+        legs.append(
+            lambda begin: GoToTask(GoTo((x, y, home_m + behaviour.return_final_m), home_yaw, stay_s=inf), begin)
+        )
     else:
         legs.append(lambda _: LandTask((x, y), home_yaw))
     return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), *legs)

@@ -57,6 +57,8 @@ def return_to_rally(sitl: Sitl) -> None:
     sitl.takeoff(10.0)
     sitl.goto(-20.0, 30.0, 20.0)
     sitl.select("RTL")
+    sitl.wait_until(lambda: hypot(sitl.position[0] + 25.0, sitl.position[1] - 50.0) < 5.0, within=60.0)
+    assert abs(sitl.position[2] - 37.0) < 1.0
     sitl.wait_until(lambda: not sitl.armed, within=200.0)
     assert hypot(sitl.position[0] + 25.0, sitl.position[1] - 50.0) < 2.0
 

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.tasks.attitude import copter_throttle
 from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import behaviour, definitions
 from colibri.mavlink.client.parameters import ListParameters
@@ -56,6 +57,12 @@ def test_defaults_are_arducopters() -> None:
     assert flies.limits.speed_m_s == pytest.approx(10.0)
     assert (flies.return_height_m, flies.land_speed_m_s, flies.disarm_on_ground_s) == pytest.approx((15.0, 0.5, 10.0))
     assert (flies.return_delay_s, flies.return_cone, flies.uploaded_fence) == (5.0, 3.0, False)
+    assert (flies.copter_items, flies.rally_only, round(flies.hover_throttle, 2)) == (True, False, 0.39)
+
+
+@pytest.mark.parametrize(("stick", "throttle"), [(0.0, 0.0), (0.25, 0.1813), (0.5, 0.39), (0.7, 0.5953), (1.0, 1.0)])
+def test_the_throttle_stick_has_arducopters_curve(stick: float, throttle: float) -> None:
+    assert copter_throttle(stick, 0.39) == pytest.approx(throttle, abs=1e-4)
 
 
 def test_reset_returns_to_arducopters_defaults() -> None:
