@@ -11,7 +11,7 @@ from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import MissionTask
 from colibri.autopilot.commander.rules.failsafe_rule import FlightState
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, next_state
+from colibri.autopilot.commander.rules.modes import FIRST, MANUAL, Event, Mode, Need, State, next_state
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour, at_speed
@@ -340,7 +340,7 @@ class Pilot:
 
     def _idle(self) -> Guidance:
         self._rest()
-        event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
+        event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour, by_sticks=self.state.mode in MANUAL)
         if event is not None and not (event is Event.LEFT_STANDING and self.stays_armed()):
             self._stop_rotors(event, self._end(event))
         return RESTS

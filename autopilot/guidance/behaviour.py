@@ -19,6 +19,7 @@ class Behaviour:
     By `items_face`, items of missions face their way or keep the heading; if None, each has its yaw. With
     `copter_items`, their heights of 0 keep the height, and take-offs may be to below the ground. With `rally_only`,
     rally points replace home. By `hover_throttle`, 0..1, the throttle stick has ArduCopter's curve.
+    Landings by sticks disarm like others with `stick_landings_end`, else as before a flight.
     Landings are slow below `land_slow_below_m`.
     """
 
@@ -59,6 +60,7 @@ class Behaviour:
     copter_items: bool = False
     rally_only: bool = False
     hover_throttle: float = 0.0
+    stick_landings_end: bool = True
     land_high_m_s: float = 0.0
     land_slow_below_m: float = 0.0
     stick_climb_m_s: float = 0.0

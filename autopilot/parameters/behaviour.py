@@ -18,7 +18,7 @@ TRACKS = tuple(name for line in ROWS if line.name == "TRACK" for _, name in line
 """Tracks by the number of TRACK."""
 _BEHAVIOUR = Behaviour()
 
-_POLYGONS, _FLOOR, _FACES_HOME = 4, 8, (1, 3)
+_POLYGONS, _FLOOR, _FACES_HOME, _ENDS_LANDED = 4, 8, (1, 3), 4
 BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
     "return_delay_s": lambda p: 1e-3 * p["RTL_LOIT_TIME"],
     "return_final_m": lambda p: 0.01 * p["RTL_ALT_FINAL"],
@@ -30,6 +30,7 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
     "copter_items": lambda _: True,
     "rally_only": lambda p: not p["RALLY_INCL_HOME"],
     "hover_throttle": lambda p: p["MOT_THST_HOVER"],
+    "stick_landings_end": lambda p: bool(int(p["PILOT_THR_BHV"]) & _ENDS_LANDED),
     "land_high_m_s": lambda p: 0.01 * p["LAND_SPEED_HIGH"],
     "land_slow_below_m": lambda p: 0.01 * p["LAND_ALT_LOW"],
     "stick_climb_m_s": lambda p: 0.01 * p["PILOT_SPEED_UP"],

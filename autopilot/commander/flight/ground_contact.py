@@ -137,8 +137,8 @@ class GroundContact:
     def stop(self) -> None:
         self._landing = Landing()
 
-    def end_of_idling(self, now_us: int, behaviour: Behaviour) -> Event | None:
-        landed = self.times.landing_us > self.times.armed_us
+    def end_of_idling(self, now_us: int, behaviour: Behaviour, *, by_sticks: bool = False) -> Event | None:
+        landed = self.times.landing_us > self.times.armed_us and (not by_sticks or behaviour.stick_landings_end)
         on_ground_us = now_us - max(self.times.armed_us, self.times.landing_us)
         allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
         if allowed_s <= 0.0 or on_ground_us < allowed_s * 1e6:

@@ -117,8 +117,9 @@ def _take_off(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     if mission_context.landed and height <= here_m:
         height = here_m + MIN_TAKEOFF_M
     yaw = context.yaw(item)
-    high = here_m >= height - defaults.acceptance_m and not mission_context.landed
-    up = () if high else (LegPhase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
+    near_m = min(defaults.acceptance_m, 0.1 * (height - here_m)) if defaults.copter else defaults.acceptance_m
+    high = here_m >= height - near_m and not mission_context.landed
+    up = () if high else (LegPhase(TakeOff(height, yaw), _above(height - near_m)),)
     if is_here(item):
         return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))
     place = context.place(item)
