@@ -119,8 +119,10 @@ class CopterCommands(Commands):
                 yield "Invalid FENCE_ALT_MAX value"
 
     def handlers(self) -> Mapping[int, Handler]:
+        known = super().handlers()
         return {
-            **super().handlers(),
+            **known,
+            mav.MAV_CMD_NAV_VTOL_TAKEOFF: known[mav.MAV_CMD_NAV_TAKEOFF],
             **dict.fromkeys(_ACCEPTED, lambda _: None),
             mav.MAV_CMD_NAV_VTOL_LAND: lambda _: self.select(Mode.LAND),
             mav.MAV_CMD_DO_FENCE_ENABLE: self._enable_fence,

@@ -35,7 +35,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 _PLACE_US = 2.0
 """Work to find the place of an item."""
-_ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_DO_SET_HOME)
+_ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_NAV_VTOL_LAND, mav.MAV_CMD_DO_SET_HOME)
 _NONE = Refusal()
 _MOVED_M = 1.0
 _AT_HOME_M = 2.0

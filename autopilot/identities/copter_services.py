@@ -5,7 +5,7 @@ from math import radians
 
 from colibri.autopilot.commander.copter_motion import AUTO
 from colibri.autopilot.ground.conventions import PLACES, Served
-from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION
+from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, FENCE_SWITCH
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.kernels import cos
 from colibri.common.types import Vector
@@ -28,7 +28,7 @@ _THROTTLE, _YAW, _DOWN_US, _RIGHT_US, _LEFT_US, _HELD_US = 2, 3, 1050, 1900, 110
 _ARMS, _DISARMS = 1, 2
 _MODE_OPTIONS = {4: 6, 16: 3, 18: 9, 33: 17, 52: 1, 55: 4, 56: 5, 57: 23, 68: 0, 69: 16, 70: 2, 72: 7}
 """Mode number by RCn_OPTION."""
-_FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
+_ARM_OPTIONS = (41, 153)
 _SAVES_WAYPOINT, _RESETS_MISSION, _CLEARS_MISSION = 7, 24, 58
 _LOW, _MIDDLE, _HIGH = _LEVELS = (0, 1, 2)
 _M_PER_DEG = 111_319.5
@@ -260,7 +260,7 @@ class Switches(Polled):
         if mode is not None and level != _MIDDLE:
             position = self._position or 0
             self._select(mode if high else int(served.parameters[f"FLTMODE{position + 1}"]))
-        elif option == _FENCE_OPTION:
+        elif option == FENCE_SWITCH:
             served.parameters.propose("FENCE_ENABLE", int(high))
         elif option in _ARM_OPTIONS and level != _MIDDLE:
             self._arm(high)

@@ -6,7 +6,7 @@ Autocontinue is ignored, as in ArduPilot, because DroneKit recommends 0 for it.
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, place_of
+from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, FENCE_SWITCH, place_of
 from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, LegPhase, MissionContext, phases_of
 from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
 from colibri.common.types import Vector
@@ -237,6 +237,8 @@ class MissionExecutor:
             events.append(SetHome(None if here else place_of(item, mission_context.home_enu_m, mission_context.origin)))
         elif item.command == DO_AUX_FUNCTION:
             events.append(AuxFunction(int(item.p1), int(item.p2)))
+        elif item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
+            events.append(AuxFunction(FENCE_SWITCH, 2 if item.p1 == 1.0 else 0))
         elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us, events):
             return
         self._advance()

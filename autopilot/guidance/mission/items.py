@@ -14,6 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import MAX_DISTANCE_M, MAX_HEIGHT_M, height_m, misplaced
 
 DO_AUX_FUNCTION = 218  # of the dialect ardupilotmega
+FENCE_SWITCH = 11  # function of a switch
 _PAYLOAD = (
     "NAV_ROI CONDITION_DISTANCE DO_SET_RELAY DO_REPEAT_RELAY DO_SET_SERVO DO_REPEAT_SERVO DO_SET_ACTUATOR "
     "DO_RETURN_PATH_START DO_LAND_START DO_SET_ROI_LOCATION DO_SET_ROI_WPNEXT_OFFSET DO_SET_ROI_NONE "
@@ -77,10 +78,16 @@ _ALLOWED: Mapping[int, _Allowed] = {
     mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),
 }
 FLOWN: frozenset[int] = frozenset(_ALLOWED)
+_COPTERS_SKIPPED = (208, 212, 215, 216, 222, 223, 600)
+"""Parachute, autotune, repeated way, sprayer, limits of GUIDED, engine, jump tag."""
 _COPTERS: Mapping[int, _Allowed] = {
     **{command: allowed._replace(here=allowed.place) for command, allowed in _ALLOWED.items()},
     mav.MAV_CMD_NAV_SPLINE_WAYPOINT: _Allowed(True, True, here=True),
     mav.MAV_CMD_NAV_DELAY: _Allowed(p1=isfinite),
+    mav.MAV_CMD_NAV_VTOL_TAKEOFF: _Allowed(True, True, here=True),
+    mav.MAV_CMD_NAV_VTOL_LAND: _Allowed(True, here=True),
+    mav.MAV_CMD_DO_FENCE_ENABLE: _Allowed(p1=_one_of(0.0, 1.0, 2.0)),
+    **dict.fromkeys(_COPTERS_SKIPPED, _Allowed()),
     DO_AUX_FUNCTION: _Allowed(p1=_whole(0, 0xFFFF), p2=_one_of(0.0, 1.0, 2.0)),
 }
 COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h

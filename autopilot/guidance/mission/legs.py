@@ -173,7 +173,9 @@ _LEGS: Mapping[int, Leg] = {
     # A multicopter climbs on the way: it is at the height when it is there.
     mav.MAV_CMD_NAV_LOITER_TO_ALT: lambda item, context: _there(item._replace(p4=nan), context, 0.0),
     mav.MAV_CMD_NAV_TAKEOFF: _take_off,
+    mav.MAV_CMD_NAV_VTOL_TAKEOFF: _take_off,
     mav.MAV_CMD_NAV_LAND: _land,
+    mav.MAV_CMD_NAV_VTOL_LAND: _land,
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: (LegPhase(Return(), _landed, reaches=True),),
     mav.MAV_CMD_NAV_DELAY: _delay,
     mav.MAV_CMD_CONDITION_DELAY: _delay,

@@ -203,9 +203,11 @@ def test_the_vehicle_looks_along_its_way(sitl: Sitl) -> None:
     sitl.send("MISSION_ITEM", 1, 1, *item)  # changes the height
     sitl.wait_until(lambda: sitl.position[2] > 3.5, within=5.0)
     southward = items.Item(mav.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 180.0), (10.0, 20.0, 4.0))
-    sitl.upload_mission([items.takeoff(2.0), southward])
+    takeoff = items.Item(mav.MAV_CMD_NAV_VTOL_TAKEOFF, place=(10.0, 0.0, 2.0))
+    sitl.upload_mission([takeoff, items.Item(mav.MAV_CMD_DO_FENCE_ENABLE, (1.0, 0.0, 0.0, 0.0)), southward])
     sitl.select("AUTO")
     sitl.wait_until(lambda: near_angle(heading(sitl), 0.0, 20.0), within=6.0)
+    assert sitl.get_param("FENCE_ENABLE") == 1
 
 
 @AS_ARDUPILOT
