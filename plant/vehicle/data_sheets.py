@@ -9,6 +9,7 @@ import io
 import tomllib
 from itertools import pairwise
 from math import isfinite, pi, radians, sqrt
+from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 from colibri.common.config import SettingsError, read_settings
@@ -168,7 +169,7 @@ def vehicle_file(sheet: DataSheet) -> tuple[str, list[str]]:
             f"largest thrust {max_n:.3g} N is {ratio:.2f} times the weight: at least {_MIN_THRUST_TO_WEIGHT} is"
             " required (look at --mass, --propeller, --kv, --cells)"
         )
-    text = _TEMPLATE.format(**_numbers(sheet, rotor, hover)) + _battery(sheet) + _sensors()
+    text = _template(sheet).format(**_numbers(sheet, rotor, hover)) + _sensors()
     try:
         read_settings(tomllib.loads(text), Vehicle)
     except (SettingsError, tomllib.TOMLDecodeError) as error:
@@ -254,7 +255,7 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     plane = mass * arm * arm
     inertia = sheet.inertia_kg_m2 or (0.27 * plane, 0.27 * plane, 0.48 * plane)
     lag = sheet.lag_s or (0.15 if sheet.motor == "brushed" else max(0.05 * size / 0.254, 0.02))
-    drag = sheet.drag_n_s_m
+    drag, cells = sheet.drag_n_s_m, sheet.cells or 0
     pitch = "" if sheet.propeller.pitch_given else "; pitch estimated"
     by = "brushes" if sheet.motor == "brushed" else "size"
     estimated_drag = "estimated, by mass; of the rotors by tip speed in hover"
@@ -285,6 +286,10 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         "stiffness": _text(12_900.0 * mass),
         "damping": _text(143.0 * mass),
         "slip": _text(115.0 * mass),
+        "full": _text(cells * _CELL_FULL_V),
+        "empty": _text(cells * _CELL_EMPTY_V),
+        "resistance": _text(cells * 0.021 / (sheet.capacity_ah or 1.0)),
+        "capacity": _text(sheet.capacity_ah or 0.0),
     }
 
 
@@ -303,64 +308,13 @@ def _texts(numbers: tuple[float, ...]) -> str:
     return f"[{', '.join(map(_text, numbers))}]"
 
 
-def _battery(sheet: DataSheet) -> str:
-    if sheet.cells is None or sheet.capacity_ah is None:
-        return ""
-    return _BATTERY.format(
-        full=_text(sheet.cells * _CELL_FULL_V),
-        empty=_text(sheet.cells * _CELL_EMPTY_V),
-        resistance=_text(sheet.cells * 0.021 / sheet.capacity_ah),
-        capacity=_text(sheet.capacity_ah),
-    )
+def _template(sheet: DataSheet) -> str:
+    """Return the template of a file, with the battery if it is known."""
+    text = Path(__file__).with_name("new_vehicle.toml.in").read_text(encoding="utf-8")
+    return text.partition("\n[battery]")[0] if sheet.capacity_ah is None else text
 
 
 def _sensors() -> str:
     """Return the sensors of the Hummingbird's file: those of a flight controller board of today."""
     text = vehicle_text("hummingbird")
     return "\n" + text[text.index("# Sensors of a flight controller board") :]
-
-
-_TEMPLATE = """\
-# By colibri vehicle new, from data sheets. "estimated": measure it if you can.
-name = {name}
-gravity_m_s2 = 9.81
-
-[body]
-mass_kg = {mass}  # given
-inertia_kg_m2 = {inertia}  # {inertia_from}
-
-[rotors]
-speed_unit = "rad/s"
-thrust_coefficient = {thrust}  # {thrust_from}
-torque_coefficient = {torque}  # {torque_from}
-inertia_kg_m2 = {rotor_inertia}  # estimated: 3e-5 at 10 inches, by the fourth power of the diameter
-idle_speed = {idle}  # estimated: a tenth of the top speed
-max_speed = {speed}  # {speed_from}
-position_m = [{places}]  # given: {places_from}
-direction = [{spins}]  # of that order
-gyroscopic_term = "conserving"
-{strength}
-[rotors.lag]
-time_constant_up_s = {lag}  # {lag_from}
-time_constant_down_s = {lag}  # {lag_from}
-
-[drag]  # {drag_from}
-linear_n_s_m = {drag}
-rotor_coefficient = {rotor_drag}
-
-[ground]  # estimated: feet under the arms, stiffness and damping in proportion to the mass
-foot_position_m = [{feet}]
-foot_depth_m = {depth}
-stiffness_n_m = {stiffness}
-damping_n_s_m = {damping}
-friction_coefficient = 0.6
-slip_damping_n_s_m = {slip}
-"""
-_BATTERY = """
-[battery]
-full_voltage_v = {full}  # 4.2 V a cell
-empty_voltage_v = {empty}  # 3.0 V a cell
-resistance_ohm = {resistance}  # estimated: 21 milliohm Ah a cell
-capacity_ah = {capacity}  # given
-efficiency = 0.75  # estimated
-"""
