@@ -265,15 +265,11 @@ def _remainders(n: AttitudeNumbers, box: VertexBox) -> tuple[AnyArray, AnyArray]
 def _inverse(matrix: AnyArray) -> AnyArray:
     """Invert (3, 3) by cofactors; the result must be that of a Neumann series."""
     a, b, c = matrix
-    cofactors = np.array([_cross(b, c), _cross(c, a), _cross(a, b)]).T
+    cofactors = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)]).T
     inverse: AnyArray = cofactors / (a @ cofactors[:, 0])
     if (inverse < 0).any():
         raise RangeError("the control interval is too long for these rates")
     return inverse
-
-
-def _cross(a: AnyArray, b: AnyArray) -> AnyArray:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:

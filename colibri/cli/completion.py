@@ -15,6 +15,15 @@ from colibri.common.process.arguments import ArgumentParser
 from colibri.plant.__main__ import command_line as plant
 from colibri.plant.vehicle.description import vehicle_names
 
+_NAMES: dict[str, Callable[[], Sequence[str]]] = {
+    **dict.fromkeys(("track", "tracks"), track_names),
+    "profile": profile_names,
+    **dict.fromkeys(("controller", "check-controller"), controller_names),
+    **dict.fromkeys(("vehicle", "plant_vehicle", "model"), vehicle_names),
+    "show": lambda: [*profile_names(), *vehicle_names()],
+}
+"""Functions to the known values, by argument or command."""
+
 
 def completion(args: Namespace) -> int:
     print(complete(completed_parser(), args.shell))
@@ -26,30 +35,19 @@ def completed_parser() -> ArgumentParser:
     parser = parser_of(*COMMANDS)
     (commands,) = (action for action in parser._actions if isinstance(action, _SubParsersAction))  # noqa: SLF001
     commands.choices.update(plant=plant(), autopilot=autopilot())
-    names = _names()
     for command, options in commands.choices.items():
         for action in options._actions:  # noqa: SLF001
-            _complete(action, command, names)
+            _complete(action, command)
     return parser
 
 
-def _names() -> dict[str, Callable[[], Sequence[str]]]:
-    return {
-        **dict.fromkeys(("track", "tracks"), track_names),
-        "profile": profile_names,
-        **dict.fromkeys(("controller", "check-controller"), controller_names),
-        **dict.fromkeys(("vehicle", "plant_vehicle", "model"), vehicle_names),
-        "show": lambda: [*profile_names(), *vehicle_names()],
-    }
-
-
-def _complete(action: Action, command: str, names: dict[str, Callable[[], Sequence[str]]]) -> None:
+def _complete(action: Action, command: str) -> None:
     metavar = action.metavar if isinstance(action.metavar, str) else ""
     named = command if action.dest == "name" and not action.option_strings else action.dest
     if action.nargs == 0 or action.choices is not None:
         return
-    if metavar in ("NAME", "TRACK", "PROFILE") and named in names:
-        action.choices = names[named]()
+    if metavar in ("NAME", "TRACK", "PROFILE") and named in _NAMES:
+        action.choices = _NAMES[named]()
     elif re.fullmatch(r"[a-z0-9-]+(\|[a-z0-9-]+)+", metavar):
         action.choices = metavar.split("|")
     elif metavar in ("DIR", "FOLDER"):

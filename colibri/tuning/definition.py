@@ -111,10 +111,6 @@ def as_tried(values: Range, value: Any) -> Any:
     return min(max(float(f"{value:.{_DIGITS}g}"), values.low), values.high)
 
 
-def as_optuna(values: Range, value: Any) -> Any:
-    return shown(value) if isinstance(values, Choice) else value
-
-
 def as_flown(values: Range, value: Any) -> Any:
     if isinstance(values, Choice):
         return next(each for each in values.values if shown(each) == value)
@@ -252,7 +248,8 @@ class Tuning(NamedTuple):
     @property
     def begins(self) -> dict[str, Any]:
         """The original values, for Optuna."""
-        return {name: as_optuna(values, _had(self.base, name)) for name, values in self.space.items()}
+        had = {name: _had(self.base, name) for name in self.space}
+        return {name: shown(had[name]) if isinstance(it, Choice) else had[name] for name, it in self.space.items()}
 
     def tuned(self, params: Mapping[str, Any]) -> Profile:
         profile: Profile = with_keys(self.flown(params), "profile", self.base)

@@ -11,7 +11,7 @@ from colibri.mavlink.hil.feedback import Feedback
 
 if TYPE_CHECKING:
     from colibri.sitl.vehicle import Sitl
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -75,21 +75,6 @@ class SitlCase(NamedTuple):
 
 SHOWN = 16
 """Characters of a hash in tables."""
-
-
-def show_table(title: str, headings: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=escape(title), title_justify="left")
-    *names, last = headings
-    for heading in names:
-        table.add_column(heading, no_wrap=True)
-    table.add_column(last, min_width=SHOWN)  # an error may be longer than the line
-    for row in rows:
-        table.add_row(*map(escape, row))
-    Console().print(table)
 
 
 GUSTS: dict[str, Any] = {"wind": "8@270", "turbulence": "moderate", "seed": 7}

@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
+from colibri.analysis.tables import print_table
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error, unknown
 from colibri.common.files import read_bytes
@@ -19,7 +20,7 @@ from colibri.flights.fly import FlightError
 from colibri.flights.folder import make_folder
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.verification.golden_flights import FLIGHTS, SHOWN, SitlCase, TrackCase, show_table
+from colibri.verification.golden_flights import FLIGHTS, SHOWN, SitlCase, TrackCase
 
 FOUND = "golden.json"
 """File of the results in the folder of the logs."""
@@ -121,14 +122,14 @@ def _print_golden(outcomes: Sequence[GoldenResult], known: Mapping[str, str], ar
         expected = known[outcome.name]
         found = "the same" if outcome.sha256 == expected else outcome.sha256[:SHOWN] or outcome.error
         rows.append((outcome.name, f"{outcome.wall_time_s:.1f} s", expected[:SHOWN], found))
-    show_table(title, ("flight", "took", "expected", "found"), rows)
+    print_table(title, ("flight", "took", "expected", "found"), rows, names=4)
 
 
 def _print_changes(path: Path, old: Mapping[str, str], new: Mapping[str, str]) -> None:
     changed = [name for name in {**new, **old} if old.get(name) != new.get(name)]
     rows = [(name, *(hashes.get(name, _NO_HASH)[:SHOWN] for hashes in (old, new))) for name in changed]
     if changed:
-        show_table(f"{path}: {len(changed)} of {len(new)} changed", ("flight", "was", "is"), rows)
+        print_table(f"{path}: {len(changed)} of {len(new)} changed", ("flight", "was", "is"), rows, names=3)
     else:
         sys.stdout.write(f"{path}: nothing changed\n")
 
@@ -194,4 +195,4 @@ def _print(verdicts: list[CaseResult], args: argparse.Namespace) -> None:
         replayed = f"{verdict.commands} commands" if verdict.replays else "differs"
         hashes = dict.fromkeys(sha256[:SHOWN] for sha256 in verdict.hashes)
         rows.append((verdict.name, "\n".join(hashes), replayed, "yes" if verdict.same else "NO"))
-    show_table(title, ("flight", "trajectory", "replayed", "the same"), rows)
+    print_table(title, ("flight", "trajectory", "replayed", "the same"), rows, names=4)
