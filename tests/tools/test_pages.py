@@ -7,7 +7,7 @@ import pytest
 
 from tools.pages.__main__ import main
 from tools.pages.payload import PAYLOAD_KG, draw, fly
-from tools.pages.rotor_loss import CASES, SEEDS, RotorLossFlight, table
+from tools.pages.rotor_loss import CASES, SEEDS, RotorLossFlight, measured, table
 from tools.pages.tables import with_tables
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -32,7 +32,7 @@ def test_a_page_is_written_with_its_pictures(page: str, tmp_path: Path, monkeypa
     assert (tmp_path / f"{page}.png").exists() is (DOCS / f"{page}.png").exists()
 
 
-def flown(seed: int = 0, *, drift_m_s: float = 0.1, tilt_deg: float = 15.0) -> RotorLossFlight:
+def flown(seed: int = 0, *, drift_m_s: float = 0.1, tilt_deg: float = 15.0, rights: bool = True) -> RotorLossFlight:
     """Return a flight that tilts to 40° for 0.2 s, sinks from 4 m at 1 m/s, and rests after a touch-down at 4 s."""
     t = np.arange(-100, 1250) * 0.004
     after = np.maximum(t, 0.0)
@@ -42,7 +42,7 @@ def flown(seed: int = 0, *, drift_m_s: float = 0.1, tilt_deg: float = 15.0) -> R
     vz = np.where(on_ground | (t <= 0.0), 0.0, -1.0)
     controls = np.full((t.size, 4), 0.5)
     path = np.column_stack([t, drift_m_s * after, 0.0 * t, z, vz, tilt, -5.0 * after, controls])
-    return RotorLossFlight(seed, 0.02, path, rights=True)
+    return measured(seed, 0.02, path, rights=rights)
 
 
 def test_the_measures_of_a_flight() -> None:
@@ -61,7 +61,7 @@ def test_the_measures_of_a_flight() -> None:
 def test_what_is_not_well() -> None:
     assert not flown(tilt_deg=21.0).well
     assert not flown(drift_m_s=1.5).well
-    assert not flown()._replace(rights=False).well
+    assert not flown(rights=False).well
 
 
 def test_the_table_has_the_median_and_the_worst() -> None:

@@ -54,56 +54,46 @@ class RotorLossCase(NamedTuple):
 
 
 class RotorLossFlight(NamedTuple):
+    """A flight; what is measured ends with the touch-down."""
+
     seed: int  # of everything random; the rotor is seed mod 4
-    noticed_s: float  # from the loss to its detection; nan without
     path: Array  # `COLUMNS`, one row a frame until the vehicle rests, (n, 11)
-    rights: bool  # whether the right rotor was named
+    noticed_ms: float  # from the loss to its detection; nan without
+    peak_deg: float
+    upright_s: float  # when the tilt falls below 20° for good
+    settled_deg: float  # largest tilt from 1 s on
+    max_distance_m: float
+    landed_m: float
+    touched_m_s: float
+    spin_rad_s: float
+    rest_deg: float
+    well: bool
 
-    @property
-    def lost(self) -> Array:
-        after = self.path[self.path[:, _T] > 0.0]
-        # A larger change of the vertical speed between rows is the ground's.
-        touched = np.flatnonzero(np.diff(after[:, _VZ]) > 9.81 * (after[1, _T] - after[0, _T]))
-        low = [row for row in touched.tolist() if after[row, _Z] < _LOW_M]
-        return after[: low[0] + 1] if low else after
 
-    @property
-    def peak_deg(self) -> float:
-        return float(self.lost[:, _TILT].max())
-
-    @property
-    def upright_s(self) -> float:
-        beyond = np.flatnonzero(self.lost[:, _TILT] > UPRIGHT_DEG)
-        return float(self.lost[beyond[-1], _T]) if beyond.size else 0.0
-
-    @property
-    def settled_deg(self) -> float:
-        return float(self.lost[self.lost[:, _T] > SETTLED_S, _TILT].max())
-
-    @property
-    def max_distance_m(self) -> float:
-        return float(np.hypot(self.lost[:, _X], self.lost[:, _Y]).max())
-
-    @property
-    def landed_m(self) -> float:
-        return float(np.hypot(self.lost[-1, _X], self.lost[-1, _Y]))
-
-    @property
-    def touched_m_s(self) -> float:
-        return float(-self.lost[-1, _VZ])
-
-    @property
-    def spin_rad_s(self) -> float:
-        return float(np.abs(self.lost[:, _SPIN]).max())
-
-    @property
-    def rest_deg(self) -> float:
-        return float(self.path[-1, _TILT])
-
-    @property
-    def well(self) -> bool:
-        upright = self.settled_deg <= UPRIGHT_DEG and self.rest_deg <= UPRIGHT_DEG
-        return self.rights and upright and self.landed_m <= NEAR_M and self.touched_m_s <= SOFT_M_S
+def measured(seed: int, noticed_s: float, path: Array, *, rights: bool) -> RotorLossFlight:
+    """Measure a flight; `rights`: the right rotor was named."""
+    after = path[path[:, _T] > 0.0]
+    # A larger change of the vertical speed between rows is the ground's.
+    touched = np.flatnonzero(np.diff(after[:, _VZ]) > 9.81 * (after[1, _T] - after[0, _T]))
+    low = [row for row in touched.tolist() if after[row, _Z] < _LOW_M]
+    t, x, y, _, vz, tilt, spin = (after[: low[0] + 1] if low else after).T[: _SPIN + 1]
+    beyond, away_m = np.flatnonzero(tilt > UPRIGHT_DEG), np.hypot(x, y)
+    settled_deg, rest_deg, touched_m_s = float(tilt[t > SETTLED_S].max()), float(path[-1, _TILT]), float(-vz[-1])
+    landed_m, upright = float(away_m[-1]), max(settled_deg, rest_deg) <= UPRIGHT_DEG
+    return RotorLossFlight(
+        seed=seed,
+        path=path,
+        noticed_ms=1e3 * noticed_s,
+        peak_deg=float(tilt.max()),
+        upright_s=float(t[beyond[-1]]) if beyond.size else 0.0,
+        settled_deg=settled_deg,
+        max_distance_m=float(away_m.max()),
+        landed_m=landed_m,
+        touched_m_s=touched_m_s,
+        spin_rad_s=float(np.abs(spin).max()),
+        rest_deg=rest_deg,
+        well=rights and upright and landed_m <= NEAR_M and touched_m_s <= SOFT_M_S,
+    )
 
 
 def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
@@ -162,7 +152,7 @@ def _lose(flight: SteppedFlight[Copter], seed: int, fault: Fault) -> RotorLossFl
     path = np.array(rows)
     at_loss = int(np.argmin(np.abs(path[:, _T])))
     path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
-    return RotorLossFlight(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
+    return measured(seed, noticed_s, path, rights=copter.parts.rotor_loss.lost == fault.instance - 1)
 
 
 SEEDS = range(50)
@@ -179,15 +169,15 @@ CASES = (
 )
 _DRAWN = CASES[3]
 _THICK_SEED = 5
-_MEASURES: tuple[tuple[str, Callable[[RotorLossFlight], float], str], ...] = (
-    ("detected after (ms)", lambda flown: 1e3 * flown.noticed_s, ".0f"),
-    ("largest tilt (°)", lambda flown: flown.peak_deg, ".1f"),
-    ("below 20° for good after (s)", lambda flown: flown.upright_s, ".2f"),
-    ("tilt from 1 s on (°)", lambda flown: flown.settled_deg, ".1f"),
-    ("farthest (m)", lambda flown: flown.max_distance_m, ".2f"),
-    ("landed at (m)", lambda flown: flown.landed_m, ".2f"),
-    ("touch-down (m/s)", lambda flown: flown.touched_m_s, ".2f"),
-    ("spin (rad/s)", lambda flown: flown.spin_rad_s, ".1f"),
+_MEASURES = (
+    ("detected after (ms)", "noticed_ms", ".0f"),
+    ("largest tilt (°)", "peak_deg", ".1f"),
+    ("below 20° for good after (s)", "upright_s", ".2f"),
+    ("tilt from 1 s on (°)", "settled_deg", ".1f"),
+    ("farthest (m)", "max_distance_m", ".2f"),
+    ("landed at (m)", "landed_m", ".2f"),
+    ("touch-down (m/s)", "touched_m_s", ".2f"),
+    ("spin (rad/s)", "spin_rad_s", ".1f"),
 )
 _MANY, _ONE, _LIMIT = "#9DB8D2", "#0B3C6F", "#D55E00"
 _ROTORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
@@ -204,10 +194,10 @@ def draw(flown: Sequence[RotorLossFlight], title: str) -> Figure:
     figure = Figure(figsize=(10.0, 9.6), dpi=130)
     grid = figure.add_gridspec(5, 2, top=0.9, bottom=0.055, left=0.08, right=0.985, hspace=0.14, wspace=0.13)
     quantities: tuple[tuple[str, Callable[[Array], Array]], ...] = (
-        ("height (m)", lambda path: path[:, COLUMNS.index("z")]),
-        ("off its place (m)", lambda path: np.hypot(path[:, 1], path[:, 2])),
-        ("tilt of the thrust (°)", lambda path: path[:, COLUMNS.index("tilt")]),
-        ("spin (rad/s)", lambda path: np.abs(path[:, COLUMNS.index("spin")])),
+        ("height (m)", lambda path: path[:, _Z]),
+        ("off its place (m)", lambda path: np.hypot(path[:, _X], path[:, _Y])),
+        ("tilt of the thrust (°)", lambda path: path[:, _TILT]),
+        ("spin (rad/s)", lambda path: np.abs(path[:, _SPIN])),
     )
     for column, shown in enumerate((_FIRST_S, _WHOLE_S)):
         for row, (name, quantity) in enumerate(quantities):
@@ -223,16 +213,13 @@ def draw(flown: Sequence[RotorLossFlight], title: str) -> Figure:
             if name.startswith("tilt"):
                 axes.axhline(UPRIGHT_DEG, color=_LIMIT, linewidth=0.9, linestyle="--", label="20°")
         axes = figure.add_subplot(grid[len(quantities), column])
-        _draw_rotors(axes, next(one for one in flown if one.seed == _THICK_SEED))
+        path = next(one.path for one in flown if one.seed == _THICK_SEED)
+        for rotor, color in enumerate(_ROTORS):
+            commands = path[:, COLUMNS.index("c1") + rotor]
+            axes.plot(path[:, 0], commands, color=color, linewidth=0.7, label=f"rotor {rotor + 1}")
         _finish(axes, "rotor commands" if column == 0 else "", shown, last=True)
     put_head(figure, title)
     return figure
-
-
-def _draw_rotors(axes: Axes, flown: RotorLossFlight) -> None:
-    for rotor, color in enumerate(_ROTORS):
-        label = f"rotor {rotor + 1}"
-        axes.plot(flown.path[:, 0], flown.path[:, COLUMNS.index("c1") + rotor], color=color, linewidth=0.7, label=label)
 
 
 def _finish(axes: Axes, name: str, shown: tuple[float, float], *, last: bool = False) -> None:
@@ -247,7 +234,7 @@ def _finish(axes: Axes, name: str, shown: tuple[float, float], *, last: bool = F
 def _cells(flown: Sequence[RotorLossFlight]) -> list[str]:
     cells = []
     for _, measure, form in _MEASURES:
-        values = [measure(one) for one in flown]
+        values = [getattr(one, measure) for one in flown]
         cells.append(f"{float(np.median(values)):{form}}; {max(values):{form}}")
     return cells
 
