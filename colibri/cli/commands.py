@@ -91,7 +91,7 @@ _TEXTS = {
         "compile cli.compilation": """compile what flights and flight tests need, beforehand
             colibri compile           # once after installation, in CI before pytest
             colibri compile flight    # only what a flight with the profile flight needs""",
-        "doctor doctor.checks": """look whether everything is there that flights need
+        "doctor doctor": """look whether everything is there that flights need
             colibri doctor
             colibri doctor --gcs    # wait for a ground station, too""",
         "bench bench.run": """measure how fast it flies

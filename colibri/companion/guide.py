@@ -16,12 +16,13 @@ from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.references import PastReference, ReferenceHistory, StepFlight, smoothly_started
 from colibri.companion.supervision import rules
-from colibri.companion.supervision.monitors import Consistency, SetpointRate
 from colibri.companion.supervision.phases import (
     WITHIN_S,
     CompanionEnd,
     CompanionPhase,
+    Consistency,
     PhaseCondition,
+    SetpointRate,
     how_it_ended,
     next_phase,
 )

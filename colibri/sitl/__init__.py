@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.sitl.backends.lockstep import SessionError as SessionError
+    from colibri.sitl.backends.link_faults import SessionError as SessionError
     from colibri.sitl.backends.setting import Setting as Setting
     from colibri.sitl.backends.setting import SettingError as SettingError
     from colibri.sitl.errors import SitlError as SitlError

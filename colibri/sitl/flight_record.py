@@ -17,7 +17,7 @@ from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
-from colibri.sitl.backends.lockstep import Instant
+from colibri.sitl.backends.link_faults import Instant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

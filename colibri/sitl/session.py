@@ -11,7 +11,7 @@ from colibri.common.process.lifecycle import freeze_once
 from colibri.common.spec import values_of
 from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.launcher import Launcher
-from colibri.sitl.backends.lockstep import QuickClock
+from colibri.sitl.backends.link_faults import QuickClock
 from colibri.sitl.backends.lockstep_session import LockstepSession, PlantSide
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of

@@ -6,7 +6,7 @@ import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import SITUATIONS, ChaosFlight, Thrower, airborne
+from tools.chaos import SITUATIONS, ChaosFlight, Thrower, airborne
 
 
 def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, str]:

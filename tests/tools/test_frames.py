@@ -18,7 +18,7 @@ from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.service import MAX_STREAMED
 from colibri.mavlink.wire.dialect import mav
-from tools.frames.requests import REQUESTS, Sender, in_the_air
+from tools.frames import REQUESTS, Sender, in_the_air
 from tools.fuzz.vehicle import BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
@@ -29,8 +29,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from colibri.autopilot.control.qp import Qp, QpSolver
 from colibri.mavlink.files.folder import Folder
-from tools.frames.__main__ import Timed
-from tools.frames.requests import REQUESTS
+from tools.frames import Timed
+from tools.frames import REQUESTS
 from tools.fuzz.vehicle import BareFlight
 
 with TemporaryDirectory() as folder:

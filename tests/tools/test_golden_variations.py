@@ -6,8 +6,8 @@ import pytest
 
 from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
-from tools.golden.__main__ import main as golden_main
-from tools.golden.variations import GoldenHashes, Variation, fly, variations
+from tools.golden import GoldenHashes, Variation, fly, variations
+from tools.golden import main as golden_main
 from tools.harness.processes import begins_as_recorded
 
 FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mpc", "crown", "tumbling-by-se3")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.chaos.flights import Thrower
+from tools.chaos import Thrower
 from tools.random_flights.__main__ import main
 from tools.random_flights.flights import RandomEvent, RandomFlight, case_of, fly
 

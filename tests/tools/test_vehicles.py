@@ -9,7 +9,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.scaling import capability_of, scaled
 from colibri.common.config import SettingsError
 from colibri.plant.vehicle.description import load_vehicle
-from tools.vehicles.__main__ import TRIALS, fly
+from tools.vehicles import TRIALS, fly
 
 FILES = Path(__file__).parent / "vehicles"
 TABLE = load_profile("flight").table("lpv-mpc")

@@ -11,7 +11,7 @@ from typing import Literal
 
 from colibri.common.spec import to_json
 from colibri.flights.launcher import Child, ProcessSpec, how_it_ended, name_of
-from colibri.sitl.backends.lockstep import SessionError
+from colibri.sitl.backends.link_faults import SessionError
 
 _LAST_WORDS_BYTES = 2000
 

@@ -18,8 +18,7 @@ from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
-from colibri.sitl.backends.link_faults import Pipe, Trouble
-from colibri.sitl.backends.lockstep import Instant, SessionError, answers, parted
+from colibri.sitl.backends.link_faults import Instant, Pipe, SessionError, Trouble, answers, parted
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.errors import SitlError

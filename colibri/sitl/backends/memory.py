@@ -17,7 +17,7 @@ from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.spec import PlantSpec
-from colibri.sitl.backends.lockstep import LinkClock, SessionError, StoppedClock
+from colibri.sitl.backends.link_faults import LinkClock, SessionError, StoppedClock
 from colibri.sitl.backends.setting import SettingError
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these

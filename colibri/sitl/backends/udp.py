@@ -14,7 +14,7 @@ from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec
 from colibri.plant.spec import PlantSpec
 from colibri.sitl.backends.launcher import Launcher, LoggedChild
-from colibri.sitl.backends.lockstep import QuickClock, SessionError, answers, parted
+from colibri.sitl.backends.link_faults import QuickClock, SessionError, answers, parted
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 

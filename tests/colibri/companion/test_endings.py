@@ -15,8 +15,7 @@ from colibri.companion.process import _Log, _Wire
 from colibri.companion.setpoints import FlightSummary
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.steering.references import Stay, stay_of
-from colibri.companion.supervision.monitors import Consistency
-from colibri.companion.supervision.phases import CompanionPhase, PhaseCondition, how_it_ended
+from colibri.companion.supervision.phases import CompanionPhase, Consistency, PhaseCondition, how_it_ended
 from colibri.companion.supervision.rules import LIMITS
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.client.states import TimedState

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from colibri.companion.stack import ARDUPILOT, PX4, ThrustCurve
-from colibri.companion.supervision.monitors import SetpointRate
-from colibri.companion.supervision.phases import TABLE, CompanionPhase, PhaseCondition, next_phase
+from colibri.companion.supervision.phases import TABLE, CompanionPhase, PhaseCondition, SetpointRate, next_phase
 from colibri.companion.supervision.rules import (
     AGES,
     CHECKS,

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+import colibri.doctor as checks
 from colibri.cli.main import main
 from colibri.common.machine_code import on_disk
-from colibri.doctor import checks
-from colibri.doctor.checks import Finding, Severity, called, ground_station
+from colibri.doctor import Finding, Severity, called, ground_station
 from colibri.flights.fleet_spec import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav

@@ -13,8 +13,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packets
 from colibri.sitl.backends.launcher import Launcher, one_core
-from colibri.sitl.backends.link_faults import Pipe, Trouble
-from colibri.sitl.backends.lockstep import SessionError
+from colibri.sitl.backends.link_faults import Pipe, SessionError, Trouble
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.errors import SitlError
 from colibri.sitl.session import Flights

@@ -10,7 +10,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import FORCE, Sitl
 from tests.support.flying import ACCEPTED, DENIED, QUICK, refused, restart
-from tools.chaos.flights import Thrower
+from tools.chaos import Thrower
 
 pytestmark = QUICK
 

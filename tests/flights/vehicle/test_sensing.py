@@ -13,7 +13,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import QUICK, latest, restart
-from tools.chaos.flights import Thrower
+from tools.chaos import Thrower
 
 pytestmark = QUICK
 

@@ -8,7 +8,7 @@ from colibri.autopilot.core.defence.inertial_estimate import turned
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, tilt_deg
 from colibri.plant.physics.world import state_frame
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import Thrower
+from tools.chaos import Thrower
 
 
 def test_an_attitude_turns_at_its_rates() -> None:

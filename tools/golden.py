@@ -1,5 +1,6 @@
-"""Other computers, simulated: choices by the CPU are forced; and other Python versions."""
+"""`make golden`: golden flights on other CPUs, simulated by forced choices, and Pythons; 1 if any hash differs."""
 
+import argparse
 import json
 import os
 import platform
@@ -10,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.verification.verify import FOUND
 
 MIN_MINOR, MAX_MINOR = 11, 19
@@ -81,7 +84,7 @@ def _version(python: Path) -> str:
     return said.stdout.strip()
 
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 HASHES = ROOT / "tests" / "golden" / "hashes.json"
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 NO_AVX2_NOR_FMA = "glibc.cpu.hwcaps=-AVX2_Usable,-AVX2,-FMA_Usable,-FMA,-FMA4_Usable,-FMA4,-AVX512F_Usable,-AVX512F"
@@ -194,3 +197,85 @@ def _environment(variation: Variation) -> dict[str, str]:
     varied |= {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
     usual = {name: value for name, value in os.environ.items() if name not in varied}
     return {**usual, **ONE_THREAD, **variation.environment}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    args = _arguments(argv)
+    try:
+        if args.pythons:
+            _set_up_pythons()
+        return _fly_all(_chosen(args), args)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended)
+
+
+def table(flown: Mapping[str, GoldenHashes]) -> str:
+    names = list(flown)
+    flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
+    differing = {name: each.differing() for name, each in flown.items()}
+    rows = [["flight", *names], ["---", *("---" for _ in names)]]
+    rows += [[flight, *("**differs**" if flight in differing[name] else "=" for name in names)] for flight in flights]
+    rows.append(["took", *(f"{each.took_s:.0f} s" for each in flown.values())])
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:
+    flown: dict[str, GoldenHashes] = {}
+    failed = False
+    for variation in chosen:
+        obstacle = variation.obstacle()
+        if obstacle:
+            print(f"{variation.name}: not flown: {obstacle}", flush=True)
+            continue
+        with TemporaryDirectory(prefix="golden-") as out:
+            try:
+                flown[variation.name] = done = fly(variation, Path(out), args.link, args.only)
+            except VariationError as error:
+                print(f"FAILED: {error}", flush=True)
+                failed = True
+                continue
+        differing = done.differing()
+        failed |= bool(differing)
+        print(f"{variation.name}: {len(done.hashes)} flights in {done.took_s:.0f} s, {len(differing)} differ")
+        for flight, (expected, found) in differing.items():
+            print(f"  {flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}")
+        sys.stdout.flush()
+    if args.table:
+        args.table.write_text(table(flown), encoding="utf-8")
+    return EXIT_FAILED if failed else 0
+
+
+def _chosen(args: argparse.Namespace) -> list[Variation]:
+    known = {variation.name: variation for variation in variations()}
+    for name in args.variation:
+        if name not in known:
+            fail(f"--variation {name}: there is no such variation; there are {', '.join(known)}")
+    if args.pythons:
+        return [variation for name, variation in known.items() if name.startswith("python-")]
+    return [variation for name, variation in known.items() if not args.variation or name in args.variation]
+
+
+def _set_up_pythons() -> None:
+    for version, python in other_pythons().items():
+        print(f"Python {version}: {python}, in .venv-{version} from requirements.lock", flush=True)
+        try:
+            set_up(ROOT, version, python)
+        except subprocess.CalledProcessError as error:
+            words = (error.stderr or "").strip().splitlines()
+            fail(f"cannot set up .venv-{version}: {words[-1] if words else error}", EXIT_FAILED)
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tools.golden", description=__doc__)
+    parser.add_argument("--link", default="memory", choices=("memory", "udp"), help="(default %(default)s)")
+    parser.add_argument("--only", action="append", default=[], metavar="FLIGHT", help="only this; may be repeated")
+    parser.add_argument("--variation", action="append", default=[], metavar="NAME", help="only this; may be repeated")
+    parser.add_argument(
+        "--pythons", action="store_true", help="set up each other Python in .venv-3.N, and fly under them"
+    )
+    parser.add_argument("--table", type=Path, metavar="FILE", help="write flights × variations there, as Markdown")
+    return parser.parse_args(argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

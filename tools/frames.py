@@ -1,18 +1,28 @@
-"""Requests of ground stations that cost a vehicle the most."""
+"""`python -m tools.frames`: the longest frame of each request, in ms of work."""
 
+import argparse
+import random
+import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, closing
 from math import cos, nan, pi, sin
+from pathlib import Path
 from struct import pack
+from tempfile import TemporaryDirectory
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.process.lifecycle import gc_frozen, use_one_thread
+from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
 from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from tools.fuzz.messages import COMMANDS, Messages
 from tools.fuzz.vehicle import HIGH, BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
+from tools.harness.frame_times import FrameTimes, gc_off
 
 TO = (SYSTEM, COMPONENT)
 STATIONS = 32
@@ -116,7 +126,7 @@ def _upload(plan_type: int, items: list[MissionItem], first: Mapping[int, list[M
     return request
 
 
-def _files(opcode: int, path: bytes, count: int) -> Request:
+def _file_requests(opcode: int, path: bytes, count: int) -> Request:
     return _once(lambda send: [send.file(opcode, path, session=i) for i in range(count)])
 
 
@@ -228,15 +238,15 @@ REQUESTS: Mapping[str, Request] = {
     "100 fences cleared": _planned("MISSION_CLEAR_ALL", *TO, FENCE, count=100),
     "120 mission items read": _planned("MISSION_REQUEST_INT", *TO, 5, 0, count=120),
     "130 turns of the mission": _planned("MISSION_SET_CURRENT", *TO, 3, count=130),
-    "15 listings of 1000 files": _files(_LIST, b"/", 15),
-    "15 checksums of 8 MB": _files(_CHECKSUM, b"/big", 15),
-    "15 packed parameter files": _files(_OPEN, b"@PARAM/param.pck", 15),
-    "15 new files": _files(_CREATE, b"/new", 15),
+    "15 listings of 1000 files": _file_requests(_LIST, b"/", 15),
+    "15 checksums of 8 MB": _file_requests(_CHECKSUM, b"/big", 15),
+    "15 packed parameter files": _file_requests(_OPEN, b"@PARAM/param.pck", 15),
+    "15 new files": _file_requests(_CREATE, b"/new", 15),
     "8 bursts": _bursts,
     "200 lists of logs": _repeated("LOG_REQUEST_LIST", *TO, 0, 0xFFFF, count=200),
     "all logs erased": _repeated("LOG_ERASE", *TO, count=200),
-    "15 listings of generated files": _files(_LIST, b"/@PARAM", 15),
-    "15 paths of 16 folders": _files(_OPEN, b"/" + b"folder/" * 15 + b"file", 15),
+    "15 listings of generated files": _file_requests(_LIST, b"/@PARAM", 15),
+    "15 paths of 16 folders": _file_requests(_OPEN, b"/" + b"folder/" * 15 + b"file", 15),
     "15 logs of 8 MB": _repeated("LOG_REQUEST_DATA", *TO, 0, 0, 0xFFFFFFFF, count=120),
     "120 downloads of the mission": _planned("MISSION_REQUEST_LIST", *TO, 0, count=120),
     "120 parameters read": _repeated("PARAM_REQUEST_READ", *TO, b"VEH_MASS", -1, count=120),
@@ -278,3 +288,92 @@ def in_the_air(flight: BareFlight) -> None:
     flight.copter.pilot.ground.take_off(0)
     flight.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 21196.0)
     flight.run(0.2)
+
+
+FRAMES_AFTER = 60
+MOST_BYTES = 4096
+"""What a link receives at once."""
+FILES = 999
+
+
+class Timed:
+    def __init__(self, flight: BareFlight) -> None:
+        self.flight = flight
+        self._frames_s = FrameTimes(flight.autopilot)
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """The longest frame and all frames, ms of work."""
+        return 1e3 * max(self._frames_s), 1e3 * sum(self._frames_s)
+
+    def send(self, messages: list[bytes]) -> None:
+        while sum(map(len, messages)) > MOST_BYTES:
+            messages.pop()
+        if messages:
+            self.flight.client.send_raw(b"".join(messages))
+        self.flight.step()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tools.frames", description=__doc__)
+    parser.add_argument("only", nargs="*", help="parts of names of requests")
+    parser.add_argument("--random", type=int, default=10_000, help="random messages, 40 a frame")
+    parser.add_argument("--repeat", type=int, default=2, help="of which the quickest counts")
+    args = parser.parse_args()
+    use_one_thread()
+    print(f"{'request':45} {'worst frame':>11} {'in all':>9}   ms of work")
+    worst = 0.0
+    for name, request in REQUESTS.items():
+        if not args.only or any(part in name for part in args.only):
+            times = min(_times(request, gc_off, FRAMES_AFTER) for _ in range(args.repeat))
+            worst = max(worst, times[0])
+            _print(name, *times)
+    if args.random and not args.only:
+        times = _times(_random(args.random), gc_frozen)  # as processes fly
+        _print(f"{args.random} random messages", *times)
+        worst = max(worst, times[0])
+    _print("worst", worst, 0.0)
+    return 0
+
+
+def _print(name: str, worst_ms: float, total_ms: float) -> None:
+    print(f"{name:45} {worst_ms:11.2f} {total_ms:9.1f}", flush=True)
+
+
+def _times(
+    request: Request, garbage: Callable[[], AbstractContextManager[None]], frames_after: int = 0
+) -> tuple[float, float]:
+    with TemporaryDirectory() as folder, closing(_files(Path(folder))) as files:
+        flight = BareFlight(files=files)
+        in_the_air(flight)
+        flight.run(0.3)
+        timed = Timed(flight)
+        with garbage():
+            for messages in request(flight):
+                timed.send(list(messages))
+            for _ in range(frames_after):
+                timed.send([])
+    return timed.times
+
+
+def _random(count: int) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        names = [parameter.name for parameter in flight.copter.parameters]
+        messages = Messages(random.Random(1), names, COMMANDS)
+        for _ in range(count // 40):
+            yield [messages.any().frame for _ in range(40)]
+
+    return request
+
+
+def _files(folder: Path) -> Folder:
+    for name in ("file", "logs/log"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        for number in range(FILES):
+            (folder / f"{name}{number:04}").touch()
+    (folder / "big").write_bytes(bytes(8 << 20))
+    return Folder(folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,1 +1,0 @@
-"""Exceptions thrown into each part of a flight."""

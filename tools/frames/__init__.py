@@ -1,1 +1,0 @@
-"""Time of a frame, whatever ground stations request."""

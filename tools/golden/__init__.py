@@ -1,1 +1,0 @@
-"""Golden flights as on other computers."""

@@ -1,1 +1,0 @@
-"""Flights of every vehicle of a folder, in memory."""
