@@ -25,7 +25,6 @@ PACKAGES = (
     "colibri.bench",
     "colibri.certification",
     "colibri.cli",
-    "colibri.doctor",
     "colibri.gym",
     "colibri.lpv",
     "colibri.studies",
