@@ -23,6 +23,7 @@ DO_SEND_BANNER = 42428
 """Of the dialect ardupilotmega."""
 _BY_THRUST, _YAW_STAYS, _WITHOUT_THROTTLE = 8, 0, 2
 _MAX_SPIN = 0.3
+_POSITIVE = ("PSC_POSXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I")
 _ALT_MAX, _CIRCLE = 1, 2
 STABILIZE, LAND, GUIDED_NOGPS = 0, 9, 20
 _RADIO, _STATION = Condition.STICKS_LOST, Condition.STATION_LOST
@@ -104,6 +105,9 @@ class CopterCommands(Commands):
             yield f"Motors: MOT_SPIN_MIN too high {value['MOT_SPIN_MIN']:.2f} > {_MAX_SPIN:.1f}"
         if value["MOT_SPIN_ARM"] > value["MOT_SPIN_MIN"]:
             yield "Motors: MOT_SPIN_ARM > MOT_SPIN_MIN"
+        for name in _POSITIVE:
+            if value[name] <= 0.0:
+                yield f"{name} must be > 0"
         if self.modes.shown.number == AUTO and not self._missions.total:
             yield "Mode requires mission"
         channels = self._pilot.sensed.steered.channels

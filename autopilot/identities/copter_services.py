@@ -250,7 +250,7 @@ class Switches(Polled):
         if not option or not (high or value < _LOW_US) or self._high.get(number) is high:
             return
         before, self._high[number] = self._high.get(number), high
-        if before is None and not high:
+        if before is None and (not high or option in _ARM_OPTIONS):
             return
         self._act(option, _HIGH if high else _LOW)
 

@@ -11,6 +11,7 @@ from colibri.mavlink.telemetry.encoder import Encoder, degrees_e7, fitted
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.telemetry.status import ESTIMATED
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
 
 _STABILIZE, _ALT_HOLD = 0, 2
 _SERVO_MV, _BOARD_MV = 0, 5000
@@ -53,6 +54,19 @@ def ahrs2(s: TelemetrySnapshot) -> Fields:
 def simstate(s: TelemetrySnapshot) -> Fields:
     """SIMSTATE (164): attitude, specific force, rates and place; rad, m/s2, rad/s, degE7."""
     return (*angles_frd(s), *sensors.specific_force_frd(s), *s.rate_frd, *degrees_e7(s.place))
+
+
+def sim_state(s: TelemetrySnapshot) -> Fields:
+    """SIM_STATE (108): as SIMSTATE, with quaternion, height above the sea, m, and velocity NED, m/s."""
+    place, velocity = s.place, ned_from_enu(s.velocity_enu_m_s)
+    motion = (*ned_frd_from_enu_flu(s.attitude), *angles_frd(s), *sensors.specific_force_frd(s), *s.rate_frd)
+    there = (place.latitude_deg, place.longitude_deg, place.altitude_m)
+    return (*motion, *there, 0.0, 0.0, *velocity, *degrees_e7(place))
+
+
+def extended_sys_state(s: TelemetrySnapshot) -> Fields:
+    """EXTENDED_SYS_STATE (245), as a multicopter."""
+    return (mav.MAV_VTOL_STATE_MC, s.landed_state)
 
 
 def wind(s: TelemetrySnapshot) -> Fields | None:
@@ -101,6 +115,8 @@ _ENCODERS: dict[str, Encoder] = {
     "AHRS": lambda _: (0.0, 0.0, 0.0, 0.0, 0.0, 0.002, 0.002),
     "AHRS2": ahrs2,
     "SIMSTATE": simstate,
+    "SIM_STATE": sim_state,
+    "EXTENDED_SYS_STATE": extended_sys_state,
     "MEMINFO": lambda _: (0, 2**16 - 1),
     "POWER_STATUS": lambda _: (_BOARD_MV, _SERVO_MV, 0),
     "WIND": wind,
