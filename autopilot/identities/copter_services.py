@@ -15,6 +15,7 @@ from colibri.mavlink.mission.items import MISSION, MissionItem
 from colibri.mavlink.node.service import Peer, Send, Service, to
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.statustext import CRITICAL, INFO, WARNING
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import Message, mav
 
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
@@ -30,6 +31,7 @@ _MODE_OPTIONS = {4: 6, 16: 3, 18: 9, 33: 17, 52: 1, 55: 4, 56: 5, 57: 23, 68: 0,
 """Mode number by RCn_OPTION."""
 _ARM_OPTIONS = (41, 153)
 _SAVES_WAYPOINT, _RESETS_MISSION, _CLEARS_MISSION = 7, 24, 58
+_WHILE_ARMED = 3  # FENCE_AUTOENABLE
 _LOW, _MIDDLE, _HIGH = _LEVELS = (0, 1, 2)
 _M_PER_DEG = 111_319.5
 _STREAMS = {
@@ -201,6 +203,8 @@ class Switches(Polled):
         super().__init__(served)
         self._channels: tuple[int, ...] = ()
         self._position: int | None = None
+        self._seen: TelemetrySnapshot | None = None
+        self._fenced = False
         self._high: dict[int, bool] = {}
         self._stick, self._since_us = 0, 0
 
@@ -215,9 +219,12 @@ class Switches(Polled):
         snapshot, functions = self._served.snapshot, self._served.missions.functions
         while functions:
             self._act(*functions.pop(0))
-        if snapshot is None or not snapshot.channels:
+        if snapshot is None or snapshot is self._seen:
             return ()
-        channels = snapshot.channels
+        self._seen, channels = snapshot, snapshot.channels
+        self._enable_fence(int(self._served.parameters["FENCE_AUTOENABLE"]), snapshot)
+        if not channels:
+            return ()
         if channels != self._channels:
             self._channels = channels
             self._switch(channels, armed=snapshot.armed)
@@ -228,6 +235,14 @@ class Switches(Polled):
             self._served.takeoff_by_stick(height_m)
         self._rudder(channels, now_us, armed=snapshot.armed, manual=snapshot.custom_mode == 0)
         return ()
+
+    def _enable_fence(self, when: int, snapshot: TelemetrySnapshot) -> None:
+        """Enable the fence in flight, or while armed (3)."""
+        flies = snapshot.landed_state == mav.MAV_LANDED_STATE_IN_AIR
+        wanted = snapshot.armed and when > 0 and (flies or when == _WHILE_ARMED or self._fenced)
+        if wanted is not self._fenced:
+            self._fenced = wanted
+            self._served.parameters.propose("FENCE_ENABLE", int(wanted))
 
     def _switch(self, channels: tuple[int, ...], *, armed: bool) -> None:
         number = int(self._served.parameters["FLTMODE_CH"])

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic, sleep
@@ -25,7 +26,6 @@ from tools.autotest.vehicle import FEEDBACK
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 PINNED = "90700977c553d2dfd95a305acf1c3e098e4d9477"
-SUITE = Path("Tools/autotest")
 _LOOK_EVERY_S, _GRACE_S = 0.2, 15.0
 PASSED, FAILED, LEFT_OUT = "passed", "failed", "not applicable"
 
@@ -42,93 +42,76 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("checkout", type=Path, metavar="CHECKOUT", help="a checkout of ArduPilot")
     parser.add_argument("tests", nargs="*", metavar="TEST", help="default: all that are applicable")
     parser.value("--python", "FILE", "that has the suite's libraries", default=sys.executable)
-    parser.value("--out", "DIR", "for logs, results.jsonl and table.md", type=Path, default=Path("out/autotest"))
+    parser.value("--out", "DIR", "for logs and table.md", type=Path, default=Path("out/autotest"))
     parser.value("--speedup", "N", "times real time at most", type=positive, default=100.0)
     parser.value("--feedback", "state|sensors", "input of the autopilot", type=Feedback, default=Feedback.STATE)
     parser.value("--limit", "S", "wall-clock time of one test", type=positive, default=900.0)
     args = parser.parse_intermixed_args(arguments)
     handle_endings(interrupt)
     with one_line(kept="; the outcomes so far are above"):
-        runner = Runner(args.checkout, args.python, args.out, args.speedup, args.feedback, args.limit)
-        left_out = not_applicable()
+        runner = Runner(args.checkout, args.python, args.out.resolve(), args.speedup, args.feedback, args.limit)
+        content = tomllib.loads((HERE / "not_applicable.toml").read_text(encoding="utf-8"))
+        left_out = {name: reason for reason, several in content.items() for name in several}
         names = runner.names()
         for name in args.tests:
             if name not in names:
                 raise Error(unknown("test", name, names))
-        chosen = args.tests or [name for name in names if name not in left_out]
-        outcomes = runner.run(chosen)
+        outcomes = runner.run(args.tests or [name for name in names if name not in left_out])
     if not args.tests:
         outcomes += [Outcome(name, LEFT_OUT, left_out[name]) for name in names if name in left_out]
-    text = table(outcomes, runner.version())
+    text = table(outcomes, version(args.checkout))
     (args.out / "table.md").write_text(text, encoding="utf-8")
     print(text)
     return EXIT_FAILED if any(each.outcome == FAILED for each in outcomes) else 0
 
 
-def not_applicable() -> dict[str, str]:
-    """Return the reason by the name of the test."""
-    content = tomllib.loads((HERE / "not_applicable.toml").read_text(encoding="utf-8"))
-    return {name: reason for reason, names in content.items() for name in names}
-
-
 def table(outcomes: Sequence[Outcome], version: str) -> str:
-    counts = {each: sum(it.outcome == each for it in outcomes) for each in (PASSED, FAILED, LEFT_OUT)}
-    head = f"ArduPilot {version}: " + ", ".join(f"{count} {what}" for what, count in counts.items())
+    counts = Counter(each.outcome for each in outcomes)
+    head = f"ArduPilot {version}: " + ", ".join(f"{counts[each]} {each}" for each in (PASSED, FAILED, LEFT_OUT))
     rows = [f"| {it.test} | {it.outcome} | {it.reason.replace('|', '/')} |" for it in outcomes]
     return "\n".join([head, "", "| test | outcome | reason |", "|---|---|---|", *rows, ""])
+
+
+def version(checkout: Path) -> str:
+    git = ["git", "-C", str(checkout), "rev-parse", "HEAD"]
+    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
+    return commit[:8] if commit == PINNED else f"{commit[:8]} (reasons are those of {PINNED[:8]})"
 
 
 class Runner:
     def __init__(
         self, checkout: Path, python: str, out: Path, speedup: float, feedback: Feedback, limit_s: float
     ) -> None:
-        self._checkout, self._out, self._limit_s = checkout.resolve(), out.resolve(), limit_s
-        self._suite = self._checkout / SUITE
+        self._python, self._out, self._limit_s = python, out, limit_s
+        self._suite = checkout.resolve() / "Tools" / "autotest"
         if not (self._suite / "arducopter.py").is_file():
-            raise Error(f'checkout "{checkout}" has no {SUITE}/arducopter.py: name the folder of an ArduPilot checkout')
-        self._results, logs = self._out / "results.jsonl", self._out / "buildlogs"
+            raise Error(f'checkout "{checkout}" has no Tools/autotest/arducopter.py: name a checkout of ArduPilot')
+        self._results, logs, vehicle = out / "results.jsonl", out / "buildlogs", out / "arducopter"
         logs.mkdir(parents=True, exist_ok=True)
-        self._results.unlink(missing_ok=True)
-        vehicle = self._out / "arducopter"
         command = shlex.join([sys.executable, "-m", "tools.autotest.vehicle"])
         vehicle.write_text(f'#!/bin/sh\nexport PYTHONPATH={shlex.quote(str(ROOT))}\nexec {command} "$@"\n')
         vehicle.chmod(0o755)
-        self._command = [
+        self._command: list[str | Path] = [
             python,
-            str(HERE / "suite.py"),
-            str(self._suite),
-            str(vehicle),
-            str(self._results),
+            HERE / "suite.py",
+            self._suite,
+            vehicle,
+            self._results,
             f"{speedup:g}",
         ]
-        folder = Path(python).parent
-        self._environment = {
-            **os.environ,
-            "PATH": f"{folder}{os.pathsep}{os.environ.get('PATH', '')}",
-            "PYTHONDONTWRITEBYTECODE": "1",
-            "BUILDLOGS": str(logs),
-            FEEDBACK: feedback,
-        }
-
-    def version(self) -> str:
-        """Return the commit of the checkout."""
-        git = ["git", "-C", str(self._checkout), "rev-parse", "HEAD"]
-        done = subprocess.run(git, capture_output=True, text=True, check=False)
-        commit = done.stdout.strip()
-        other = "" if commit == PINNED else f" (not {PINNED[:8]}, for which the reasons were reviewed)"
-        return f"{commit[:8] or 'of an unknown commit'}{other}"
+        path = f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+        own = {"PATH": path, "PYTHONDONTWRITEBYTECODE": "1", "BUILDLOGS": str(logs), FEEDBACK: feedback}
+        self._options: dict[str, Any] = {"cwd": out, "env": {**os.environ, **own}}
 
     def names(self) -> list[str]:
         """Return the names of the suite's tests; Error if it cannot be imported."""
         try:
-            done = subprocess.run(
-                self._command, cwd=self._out, env=self._environment, capture_output=True, text=True, check=False
-            )
+            done = subprocess.run(self._command, **self._options, capture_output=True, text=True, check=False)
         except OSError as error:
-            raise Error(f'--python "{self._command[0]}": {error.strerror}') from error
+            raise Error(f'--python "{self._python}": {error.strerror}') from error
         if done.returncode:
             why = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise Error(f"the suite cannot be imported by --python {self._command[0]}: {shown(why)}")
+            raise Error(f"the suite cannot be imported by --python {self._python}: {shown(why)}")
         names: list[str] = json.loads(done.stdout.strip().splitlines()[-1])
         return names
 
@@ -145,14 +128,11 @@ class Runner:
         """Add outcomes; return why the next test has none."""
         self._results.unlink(missing_ok=True)
         with (self._out / "suite.txt").open("a") as log:
-            suite = subprocess.Popen(
-                [*self._command, *names], cwd=self._out, env=self._environment, stdout=log, stderr=log
-            )
+            suite = subprocess.Popen([*self._command, *names], **self._options, stdout=log, stderr=log)
         ended, since_s = 0, monotonic()
         try:
             while True:
-                running = suite.poll() is None
-                notes = self._notes()
+                running, notes = suite.poll() is None, self._notes()
                 done = [note for note in notes if "passed" in note]
                 for note in done[ended:]:
                     reason = shown((note["reason"].splitlines() or [""])[0])
@@ -182,7 +162,7 @@ def _told(outcome: Outcome) -> Outcome:
     return outcome
 
 
-def _end(suite: subprocess.Popen[bytes]) -> None:
+def _end(suite: subprocess.Popen[Any]) -> None:
     """End the suite as Ctrl-C does, so that it ends its vehicle."""
     if suite.poll() is None:
         suite.send_signal(signal.SIGINT)
