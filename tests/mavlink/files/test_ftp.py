@@ -300,6 +300,14 @@ def test_every_client_has_its_own_sessions(service: Ftp, memory: MemoryFiles) ->
     assert two.ask(Opcode.READ, size=5).error == FtpError.INVALID_SESSION
 
 
+def test_the_end_of_a_session_forgets_its_own_answers_alone(service: Ftp) -> None:
+    one, two = Client(service), Client(service, OTHER)
+    kept = two.ask(Opcode.MAKE_FOLDER, b"a")
+    one.do(Opcode.OPEN_TO_READ, b"text")
+    one.do(Opcode.TERMINATE)
+    assert two.send(Opcode.MAKE_FOLDER, b"a") == [kept]
+
+
 def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> None:
     for session in range(ftp.MAX_SESSIONS_OF_A_CHANNEL):
         Client(service, PEER, session).do(Opcode.OPEN_TO_READ, b"text")

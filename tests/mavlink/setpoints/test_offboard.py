@@ -8,7 +8,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.offboard import Offboard
-from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint, PositionSetpoint
+from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
@@ -363,3 +363,9 @@ def check_position(setpoint: PositionSetpoint) -> None:
     assert any(isfinite(number) for number in numbers)
     assert not any(abs(number) > 50.001 for number in numbers[3:9])
     assert not abs(setpoint.yaw_rad) > pi + 1e-9
+
+
+def test_a_turned_velocity_with_one_horizontal_part_has_none() -> None:
+    assert turned((nan, nan, 1.0), 1.0)[2] == 1.0
+    assert all(isnan(part) for part in turned((nan, 2.0, 1.0), 1.0)[:2])
+    assert turned((2.0, 0.0, 1.0), radians(90)) == pytest.approx((0.0, 2.0, 1.0))
