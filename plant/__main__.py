@@ -65,7 +65,7 @@ def run_plant(spec: PlantSpec, starter: Starter) -> int:
     if spec.serve == "ardupilot-json":
         from colibri.plant.process.ardupilot_server import run
     else:
-        from colibri.plant.process.run import run
+        from colibri.plant.process.server import run
 
     return run(spec, link, status, stop)
 

@@ -37,9 +37,9 @@ _TEXTS = {
             colibri view out/spiral
             colibri view out/spiral out/other    # two flights in one picture
             colibri view udpin:127.0.0.1:14550""",
-        "plot cli.recorded": """draw the figures of a flight, however it ended
+        "plot cli.viewing": """draw the figures of a flight, however it ended
             colibri plot out/spiral""",
-        "export cli.recorded": """write the topics of a flight's ULog as MCAP, CSV or Parquet
+        "export cli.viewing": """write the topics of a flight's ULog as MCAP, CSV or Parquet
             colibri export out/spiral --mcap           # for Foxglove
             colibri export out/spiral --csv            # a table of each topic""",
         "replay flights.replay": """replay a recorded flight, and compare the autopilot's answers

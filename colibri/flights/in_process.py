@@ -17,7 +17,7 @@ from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 from colibri.plant.physics.start import nudged
-from colibri.plant.process.logs import TruthLog
+from colibri.plant.process.reports import TruthLog
 from colibri.plant.simulation.plant import Plant, PlantBuilder
 
 

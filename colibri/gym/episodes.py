@@ -24,7 +24,7 @@ from colibri.common.types import Array
 from colibri.gym import kernels
 from colibri.gym.arguments import gate_points, gates_of, read_draws, wind_of, within
 from colibri.gym.errors import GymError
-from colibri.plant.environment.air import CALM
+from colibri.plant.environment.turbulence import CALM
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import RK4_STEP_S
 from colibri.plant.physics.parameters import parameters_of

@@ -10,9 +10,8 @@ from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
-from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.random_streams import Noise
-from colibri.plant.environment.turbulence import Eddies
+from colibri.plant.environment.turbulence import CALM, Air, Eddies
 from colibri.plant.environment.weather import NO_WEATHER, RecordedWind, Weather, Wind
 from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, attitude_of, close_attitude, specific_force
 from colibri.plant.physics.integrators import Integrator, solver

@@ -19,8 +19,15 @@ from colibri.mavlink.links.udp import UdpLink, is_bound
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from colibri.plant.physics.start import Start, nudged
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
-from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, all_parameters_by, closing, report_end
+from colibri.plant.process.reports import (
+    MAX_WAIT_S,
+    SILENT_AFTER_S,
+    PlantLogs,
+    Silence,
+    all_parameters_by,
+    closing,
+    report_end,
+)
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import Rotors, load_vehicle
 from colibri.plant.vehicle.parameter_files import ardupilot_thrust_curve

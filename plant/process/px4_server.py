@@ -14,10 +14,10 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
 from colibri.plant.physics.start import Start, nudged
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
-from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import (
     MAX_WAIT_S,
     SILENT_AFTER_S,
+    PlantLogs,
     Silence,
     all_parameters_by,
     awaiting,

@@ -1,8 +1,9 @@
-"""Reports of the plant's servers: silence of the autopilot, end of the flight, errors."""
+"""Logs and reports of the plant's servers: silence of the autopilot, end of the flight, errors."""
 
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
@@ -10,8 +11,18 @@ from typing import Any, Protocol
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
+from colibri.common.process.log_files import set_aside
+from colibri.common.process.shared_log import SharedLog, remove_unused
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.ulog.blocks import Thinning
+from colibri.mavlink.ulog.flight_topics import MORE_TRUTH, TRUTH, split
+from colibri.mavlink.ulog.log import FileLog, TopicLog, beginning
+from colibri.mavlink.ulog.reader import FILE
+from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
+from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
+from colibri.plant.physics.world import World
+from colibri.plant.vehicle.description import Vehicle
 
 MAX_WAIT_S = 0.1  # between two checks whether the process shall end
 SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
@@ -76,3 +87,72 @@ def report_end(
     time_s = time_us / 1e6
     wall_time_s = (perf_counter() if ended_s is None else ended_s) - began_s
     status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)
+
+
+_COLUMNS = len(TRUTH.names)
+
+
+def truth_row(world: World) -> tuple[float, ...]:
+    """Return a row of `TRUTH`, followed by the speeds of more than four rotors."""
+    battery = (world.voltage_v, world.charge_used_ah)
+    speeds, others = split(world.rotor_speeds)
+    return (world.time_us / 1e6, *world.state, *speeds, *battery, *world.wind_enu_m_s, *others)
+
+
+class TruthLog:
+    """Writes the truth, also as PX4's topics where these are recorded."""
+
+    def __init__(self, log: TopicLog, vehicle: Vehicle) -> None:
+        capacity_ah = 0.0 if vehicle.battery is None else vehicle.battery.capacity_ah
+        self._log = log
+        self._blocks, self._thinning = None, Thinning()
+        if log.for_viewers:
+            self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count))
+
+    def write_world(self, world: World) -> None:
+        row = truth_row(world)
+        self._log.add(TRUTH, row[:_COLUMNS])
+        if len(row) > _COLUMNS:
+            self._log.add(MORE_TRUTH, (row[0], *row[_COLUMNS:]))
+        if self._blocks and self._thinning.is_due(world.time_us):
+            self._log.add(self._blocks, row)
+
+
+class PlantLogs:
+    """The plant's files: `flight.ulg`, shared with the autopilot, and on request `flight.tlog`."""
+
+    def __init__(self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, tlog: bool = False) -> None:
+        self._folder, self._vehicle, self._boot_unix_us, self.has_tlog = folder, vehicle, boot_unix_us, tlog
+        self._open()
+
+    def _open(self) -> None:
+        path = self._folder / FILE
+        remove_unused(path)
+        remove_unused(self._folder / TRAFFIC)
+        self._log = FileLog(partial(SharedLog, path, beginning(self._vehicle.name, {}), goes_on=True))
+        self._truth = TruthLog(self._log, self._vehicle)
+        self._tlog = TlogWriter(self._folder / TRAFFIC, shared=True) if self.has_tlog else None
+
+    def begin_again(self) -> None:
+        """Rename the files to `flight-1.ulg`, `flight-1.tlog` and so on, and begin others."""
+        self.flush()
+        self.close()
+        set_aside(*(self._folder / name for name in (FILE, TRAFFIC)))
+        self._open()
+
+    def write_world(self, world: World) -> None:
+        self._truth.write_world(world)
+
+    def write_frames(self, time_us: int, frames: list[bytes]) -> None:
+        if self._tlog:
+            self._tlog.write(self._boot_unix_us + time_us, frames)
+
+    def flush(self) -> None:
+        self._log.flush()
+        if self._tlog:
+            self._tlog.flush()
+
+    def close(self) -> None:
+        self._log.close()
+        if self._tlog:
+            self._tlog.close()

@@ -1,22 +1,27 @@
-"""The plant on a link: in lockstep, or at the pace of the wall clock, like hardware."""
+"""The plant on a link, in lockstep or at the pace of the wall clock, like hardware."""
 
 from collections.abc import Callable, Iterable
 from math import isfinite
 from time import perf_counter, sleep
 from typing import Any, TypeVarTuple
 
-from colibri.common.process.lifecycle import Stop
+from colibri.common.errors import Error
+from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PaceChange, WorldChange
-from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.links.udp import UdpLink, is_bound
+from colibri.plant.events import check_events
+from colibri.plant.physics.start import default_starts, nudged
 from colibri.plant.physics.world import World, state_frame
-from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, report_end
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, PlantLogs, Silence, closing, report_end
+from colibri.plant.sensors.suite import served_by
+from colibri.plant.simulation.plant import Plant, PlantBuilder
+from colibri.plant.spec import PlantSpec
+from colibri.plant.vehicle.description import load_vehicle
 
 Ts = TypeVarTuple("Ts")
 _CATCH_UP_S = 0.1
@@ -229,3 +234,38 @@ class FreeServer(Server):
             if command is not None or left_s <= 0.0:
                 return command
         return None
+
+
+def builder_of(spec: PlantSpec) -> PlantBuilder:
+    vehicle = load_vehicle(spec.vehicle).without(spec.without)
+    check_events(spec.events, vehicle, on_sensors=vehicle.sensors is not None)
+    usual = default_starts(vehicle)
+    starts = {it: nudged(spec.started(usual[it])) for it in served_by(vehicle)}
+    return PlantBuilder(spec, vehicle, starts, integrator=spec.integrator, origin=spec.home.origin)
+
+
+def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
+    try:
+        builder = builder_of(spec)
+    except Error as error:
+        fail(str(error))
+    if spec.truth:  # several flights share the cores: whoever waits gives way at once
+        link.spin_s = 0.0
+    logs = PlantLogs(spec.out, builder.vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
+    interval_us = round(1e3 / spec.rate) * 1000
+    end = PlantEnd(
+        system_id=spec.system_id,
+        frame_interval_us=interval_us,
+        serves=tuple(builder.starts),
+        waits=not spec.realtime,
+        rotors=builder.vehicle.rotors.count,
+        is_there=is_bound,
+    )
+    server = Server(link, end, status, stop, logs, streams_truth=spec.truth)
+    if spec.realtime:
+        server = FreeServer(link, end, status, stop, logs, cut_after_s=spec.cut_after)
+    with closing(link, logs, out=spec.out):
+        if server.wait():
+            plant = builder.build(end.feedback, end.frame_interval_us)
+            server.fly(plant, duration_s=spec.duration, speed=spec.pace)
+    return stop.code

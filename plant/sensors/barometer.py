@@ -4,8 +4,7 @@ from colibri.common.earth.atmosphere import pressure_pa
 from colibri.common.types import Vector
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import GaussMarkov, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Barometer
 
 

@@ -11,8 +11,7 @@ from colibri.mavlink.hil.sensors import GpsFix
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Measure, Rate, SensorSurroundings
+from colibri.plant.sensors.instrument import GaussMarkov, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Gps
 
 

@@ -2,8 +2,7 @@
 
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.errors import Triad
-from colibri.plant.sensors.instrument import Measure, SensorSurroundings
+from colibri.plant.sensors.instrument import Measure, SensorSurroundings, Triad
 from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
 

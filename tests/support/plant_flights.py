@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.environment.air import CALM
+from colibri.plant.environment.turbulence import CALM
 from colibri.plant.environment.weather import RecordedWind, Weather
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
-from tools.kills.__main__ import failures_of
-from tools.kills.flights import fly_autopilots, fly_plants
+from tools.kills.__main__ import failures_of, fly_autopilots, fly_plants
 
 
 @pytest.mark.long

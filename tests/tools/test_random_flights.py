@@ -3,8 +3,7 @@
 import pytest
 
 from tools.chaos import Thrower
-from tools.random_flights.__main__ import main
-from tools.random_flights.flights import RandomEvent, RandomFlight, case_of, fly
+from tools.random_flights import RandomEvent, RandomFlight, case_of, fly, main
 
 
 def case(*events: RandomEvent, well: bool = True) -> RandomFlight:
@@ -32,13 +31,13 @@ def test_an_exception_is_a_failure() -> None:
     thrower = Thrower("autopilot.commander.pilot:Pilot.select", 1)
     thrower.arm()
     try:
-        assert fly(case()).violated.startswith("ChaosError at flights.py")
+        assert fly(case()).violated.startswith("ChaosError at chaos.py")
     finally:
         thrower.disarm()
 
 
 def test_a_failing_seed_says_how_to_repeat(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("tools.random_flights.__main__.case_of", lambda _: case(RandomEvent(0.1, "disarm")))
+    monkeypatch.setattr("tools.random_flights.case_of", lambda _: case(RandomEvent(0.1, "disarm")))
     monkeypatch.setattr("sys.argv", ["random_flights", "--seeds", "3"])
     assert main() == 1
     out = capsys.readouterr().out

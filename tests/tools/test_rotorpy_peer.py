@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from colibri.bench import speed
-from tools.bench import rotorpy_peer
-from tools.bench.__main__ import main
+from tools import bench as rotorpy_peer
+from tools.bench import main
 
 
 def flights_of(out: Path) -> dict[str, Any]:

@@ -29,8 +29,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.setpoints.radio import Radio
 from colibri.plant.physics.start import Start
-from colibri.plant.process.run import builder_of
-from colibri.plant.process.server import FramePacer
+from colibri.plant.process.server import FramePacer, builder_of
 from colibri.plant.spec import PlantSpec
 
 TCP_PORT, RADIO_PORT, PORTS_EACH = 5760, 5501, 10

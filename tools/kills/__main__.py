@@ -1,18 +1,202 @@
 """`python -m tools.kills`: autopilots or plants killed in flight."""
 
 import argparse
+import random
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
-from typing import TypeVar
+from time import perf_counter, sleep
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 from colibri.common.process.arguments import natural
+from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
-from tools.kills.between import HangsError
-from tools.kills.flights import AutopilotKill, KilledMission, PlantKill, fly_autopilots, fly_plants
+from colibri.sitl.flight_record import tilt_deg
+from tools.harness.processes import Process, topic_rows
+from tools.kills.between import COMPILES_S, HOVERS, LEGS, Between, HangsError, KillInstant, KillStation, mission
+
+_APART_S, _SPREAD_S = 1.8, 1.6
+_JUDGED_S = 2.0
+_SLOW_M_S = 0.3
+_COMPUTES_S = 1.5e-3
+STANDING = "y=0,z=0,psi=90,rotors=0"
+
+
+class AutopilotKill(NamedTuple):
+    time_s: float  # of the frame, simulated
+    phase: KillInstant
+    item: int  # of the mission, current
+    hovered: bool  # at the kill
+    still: bool  # in the same item at the next kill
+    tilt_deg: float  # largest before the next kill
+    tilt_before_deg: float  # largest in the second before
+    lost_m: float  # height lost within two seconds, if still
+    moved_m: float  # then, if still
+    went_on: bool  # reported by the autopilot
+
+
+class KilledMission(NamedTuple):
+    kills: list[AutopilotKill]
+    flown: bool
+    duration_s: float
+    words: str
+
+
+@contextmanager
+def _killing(
+    folder: Path, station: KillStation, seed: int, out: Path | None = None
+) -> Iterator[tuple[list[Process], Between, str]]:
+    """Start plant and relay; yield the processes, the relay and its URL."""
+    folder.mkdir()
+    processes = [start_plant(folder, "udpin:127.0.0.1:0", seed, out)]
+    try:
+        url = processes[0].wait_for("listening")["url"]
+        _, host, port = url.split(":")
+        between = Between((host, int(port)))
+        yield processes, between, url
+        between.close()
+    finally:
+        for process in processes:
+            process.kill()
+        station.close()
+
+
+def _armed(station: KillStation) -> Callable[[], bool]:
+    return lambda: station.armed is True
+
+
+def fly_autopilots(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> KilledMission:
+    """Fly a mission, and kill the autopilot again and again."""
+    station, chance, kills = KillStation(mission(legs)), random.Random(seed), list[_Killed]()
+    with _killing(folder, station, seed, out=folder) as (processes, between, _):
+
+        def begin() -> None:
+            processes.append(start(folder, between.url, station, feedback))
+
+        def strike(phase: KillInstant) -> None:
+            if phase is KillInstant.DURING:
+                sleep(chance.uniform(0.0, _COMPUTES_S))
+            processes[-1].process.kill()
+
+        def flies_on() -> bool:
+            return between.time_us > died_us
+
+        def is_said() -> bool:
+            return any("Restarted in flight" in text for text in station.texts)
+
+        begin()
+        between.fly_until(station, _armed(station), "the rotors to be armed", COMPILES_S)
+        died_us = between.time_us - round(_APART_S * 1e6)
+        while len(kills) < max_kills:
+            phase = chance.choice(list(KillInstant))
+            due_us = died_us + round(1e6 * (_APART_S + chance.uniform(0.0, _SPREAD_S)))
+            between.at(due_us, phase, partial(strike, phase))
+            between.fly_until(station, lambda: station.flown or not between.waits, "the instant of the kill")
+            if station.flown:
+                break
+            processes[-1].process.wait()
+            died_us, item = between.time_us, station.seq
+            station.texts.clear()
+            between.cut()
+            begin()
+            between.fly_until(station, flies_on, "the flight to go on")
+            between.fly_until(station, lambda: station.flown or is_said(), "the words that it goes on")
+            kills.append(_Killed(died_us * 1e-6, phase, item, is_said()))
+        between.fly_until(station, lambda: station.flown, "the end of the mission")
+    words = "".join(process.errors() for process in processes)
+    truth = topic_rows(folder)
+    return KilledMission(judged(truth, kills), station.flown, float(truth["t"][-1]), words)
+
+
+def start(folder: Path, url: str, station: KillStation, feedback: Feedback) -> Process:
+    options = ("--plant", url, "--gcs", station.url, "--feedback", feedback, "--state", str(folder / "state"))
+    return Process(folder, "autopilot", *options)
+
+
+def start_plant(folder: Path, url: str, seed: int, out: Path | None = None) -> Process:
+    kept = () if out is None else ("--out", str(out))
+    return Process(folder, "plant", "--start", STANDING, "--seed", str(seed), "--link", url, *kept)
+
+
+class _Killed(NamedTuple):
+    time_s: float
+    phase: KillInstant
+    item: int
+    went_on: bool
+
+
+def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[AutopilotKill]:
+    t, place = truth["t"], np.stack([truth[axis] for axis in "xyz"], axis=1)
+    tilt = tilt_deg(truth)
+    speed = np.sqrt(truth["u"] ** 2 + truth["v"] ** 2 + truth["w"] ** 2)
+    found = []
+    for kill, following in zip(kills, [*kills[1:], None], strict=True):
+        end_s = following.time_s if following else np.inf
+        now = int(np.searchsorted(t, kill.time_s))
+        after, before = (t >= kill.time_s) & (t < end_s), (t >= kill.time_s - 1.0) & (t <= kill.time_s)
+        near = after & (t < kill.time_s + _JUDGED_S)
+        hovered = kill.item in HOVERS and speed[now] < _SLOW_M_S
+        still = bool(hovered and following is not None and following.item == kill.item)
+        away = np.linalg.norm(place[near] - place[now], axis=1)
+        tilts_deg = (float(tilt[after].max()), float(tilt[before].max()))
+        moved_m = (float(place[now, 2] - place[near, 2].min()), float(away.max())) if still else (0.0, 0.0)
+        found.append(AutopilotKill(*kill[:3], bool(hovered), still, *tilts_deg, *moved_m, kill.went_on))
+    return found
+
+
+_MAX_DELAY_S = 12.0
+
+
+class PlantKill(NamedTuple):
+    time_s: float
+    phase: KillInstant
+    said: str  # the autopilot's report; empty if the next plant came first
+    stood: bool  # disarmed and without a mission at the next plant's start
+
+
+def fly_plants(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[PlantKill], str]:
+    """Kill the plant again and again; start another at once, or after a report."""
+    chance, station, done = random.Random(seed), KillStation(mission()), list[PlantKill]()
+    with _killing(folder, station, seed) as (processes, between, url):
+        autopilot = start(folder, between.url, station, feedback)
+        processes.insert(0, autopilot)
+
+        died_us = before = 0
+
+        def silences() -> list[str]:
+            return [event["text"] for event in autopilot.events("silence")]
+
+        def is_gone() -> bool:
+            return len(silences()) > before
+
+        def begins_anew() -> bool:
+            return station.armed is not None and between.time_us < died_us
+
+        for _ in range(kills):
+            plant = processes[-1]
+            between.fly_until(station, _armed(station), "the rotors to be armed", COMPILES_S)
+            phase = chance.choice(list(KillInstant))
+            between.at(between.time_us + round(1e6 * chance.uniform(0.0, _MAX_DELAY_S)), phase, plant.process.kill)
+            between.fly_until(station, lambda: not between.waits, "the instant of the kill")
+            plant.process.wait()
+            died_us, before = between.time_us, len(silences())
+            if chance.random() < 0.5:
+                between.fly_until(station, is_gone, "the words that the plant is gone")
+            said = silences()[before:]
+            station.begin_anew()
+            station.drain()
+            processes.append(start_plant(folder, url, seed))
+            between.fly_until(station, begins_anew, "the next plant's flight")
+            done.append(PlantKill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False))
+        between.fly_until(station, _armed(station), "the last plant's vehicle to be armed")
+    return done, "".join(process.errors() for process in processes)
+
 
 MAX_TILT_DEG = 35.0 + 45.0
 """45° more than a pilot may ask for."""

@@ -10,8 +10,7 @@ from scipy.signal import welch
 
 from colibri.analysis.figures import GRID, put_head, write_figure
 from colibri.common.types import Array
-from colibri.plant.environment.air import CALM, Air
-from colibri.plant.environment.turbulence import scales
+from colibri.plant.environment.turbulence import CALM, Air, scales
 from colibri.plant.environment.weather import INTENSITIES, Gust, Intensity, Weather, Wind
 
 _WIND = Wind(8.0, 270.0)

@@ -14,7 +14,7 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.plant.physics.start import IntegrationError
 from colibri.plant.physics.world import state_frame
-from colibri.plant.process.run import builder_of
+from colibri.plant.process.server import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.spec import PlantSpec
 from colibri.sitl.backends.link_faults import LinkClock, SessionError, StoppedClock

@@ -16,7 +16,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tests.support.failed_sensors import Fault, flown_on, matrix, singles
 from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
-from tools.random_flights.flights import case_of, fly
+from tools.random_flights import case_of, fly
 
 pytestmark = QUICK
 

@@ -8,8 +8,7 @@ import pytest
 from scipy.signal import welch
 
 from colibri.common.types import Array
-from colibri.plant.environment.air import Air
-from colibri.plant.environment.turbulence import Turbulence, eddy_velocity, scales
+from colibri.plant.environment.turbulence import Air, Turbulence, eddy_velocity, scales
 from colibri.plant.environment.weather import Intensity, Weather
 from colibri.plant.texts import wind
 

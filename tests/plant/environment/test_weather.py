@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.common.spec import from_values
-from colibri.plant.environment.air import CALM, Air
+from colibri.plant.environment.turbulence import CALM, Air
 from colibri.plant.environment.weather import INTENSITIES, NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from colibri.common.jit import Packed, packed
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, Quaternion, Vector
-from colibri.plant.environment.air import CALM
+from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import adaptive_step
 from colibri.plant.physics.parameters import parameters_of

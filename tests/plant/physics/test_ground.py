@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from colibri.common.jit import packed
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Quaternion, Vector
-from colibri.plant.environment.air import CALM
+from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import contact_wrench
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.parameters import parameters_of

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.common.jit import packed
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.environment.air import CALM
+from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import close
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.parameters import parameters_of

@@ -15,7 +15,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process import ardupilot_server
 from colibri.plant.process.ardupilot_server import ArduPilotEnd, ArduPilotServer
-from colibri.plant.process.logs import PlantLogs
+from colibri.plant.process.reports import PlantLogs
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.ardupilot import request
 from tools.harness.processes import topic_rows

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from colibri.plant.environment.random_streams import Chance, RandomStream, streams
-from colibri.plant.sensors.errors import GaussMarkov, Triad
+from colibri.plant.sensors.instrument import GaussMarkov, Triad
 
 INTERVAL_S = 0.01
 ZERO = (0.0, 0.0, 0.0)

@@ -1,12 +1,32 @@
-"""RotorPy's Hummingbird under its SE(3) controller."""
+"""`make bench`: `colibri bench` beside RotorPy, if installed."""
 
 import os
 import sys
+from collections.abc import Sequence
 from importlib.util import find_spec
 from time import perf_counter
 from warnings import catch_warnings, simplefilter
 
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.bench.run import bench
+from colibri.bench.speed import PeerSimulator
+from colibri.cli.options import bench as add_options
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted, use_one_thread
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = ArgumentParser(prog="python -m tools.bench", description="How fast it flies, beside RotorPy.")
+    add_options(parser)
+    args = parser.parse_args(argv)
+    use_one_thread()
+    peer = PeerSimulator("rotorpy", real_time_factor) if installed() else None
+    if peer is None and "flights" in (args.only or ["flights"]):
+        sys.stderr.write(f"colibri: {MISSING}\n")
+    try:
+        return bench(args, peer)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended)
+
 
 MISSING = "RotorPy is not installed: pip install 'colibri-sitl[bench]' brings it; going on without"
 
@@ -46,3 +66,7 @@ def _environment(frames_hz: int):  # type: ignore[no-untyped-def]
             trajectory=TwoDLissajous(A=2.0, B=1.0, a=1.0, b=2.0),
             sim_rate=frames_hz,
         )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

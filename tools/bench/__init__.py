@@ -1,1 +1,0 @@
-"""RotorPy, a peer to measure beside."""

@@ -1,1 +1,0 @@
-"""Flights drawn at random: vehicles, weather, parameters, modes, failures."""
