@@ -48,7 +48,7 @@ class Supervision:
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
         lift, push, watch = None, 0.0, parts.rotor_loss.watch
         if self._doubts:
-            lift, push = watch.expected[0] / parts.loop.vehicle.gravity_m_s2, watch.push
+            lift, push = watch.expected[2] / parts.loop.vehicle.gravity_m_s2, watch.push
         parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push))
         guard(table.FAILSAFES, self._execute, table.nothing, now_us, state)
         if self._caught_us is not None:

@@ -8,10 +8,12 @@ import numpy as np
 from colibri.autopilot.estimation.eskf_predict import BLIND_FORCE, BLIND_RATE, FORCE, RATE, SAMPLE
 from colibri.autopilot.estimation.measurements.instrument import Value
 from colibri.autopilot.estimation.sensing.inertial import InertialReading, sample_between
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import compiled
 from colibri.common.types import Array, Vector
 
 _FEWEST = 6  # samples that show noise
+_LEARNT_PART = 0.1  # of the present force in the mean
 _BRIDGED_S = 0.1  # longer gaps between frames are crossed without the measurements at their ends
 
 
@@ -71,3 +73,18 @@ def roughness(samples: Array, first: int, count: int, force: float, rate: float)
     if found < _FEWEST:
         return 0.0, 0.0
     return rough[0] / found, rough[1] / found
+
+
+@compiled
+def learn_drag(samples: Array, first: int, count: int, x: Array, drag: Array) -> None:
+    """Let `drag` (2,), m/s² east and north, follow the mean force across the thrust while the sensors are good."""
+    fx, fy = 0.0, 0.0
+    for k in range(first, first + count):
+        row = k % len(samples)
+        if samples[row, BLIND_FORCE] + samples[row, BLIND_RATE] > 0.0:
+            return
+        fx += (samples[row, FORCE] - x[13]) / count
+        fy += (samples[row, FORCE + 1] - x[14]) / count
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    for i in range(2):
+        drag[i] += _LEARNT_PART * (R[i][0] * fx + R[i][1] * fy - drag[i])

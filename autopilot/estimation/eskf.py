@@ -93,6 +93,7 @@ class Filter:
         of_gps, of_others = (self.velocity, self.position, self.height), (one.kind for one in self.instruments)
         by_name = {kind.name: kind for kind in (*of_gps, *of_others)}
         self.kinds = tuple(by_name[name] for name in kinds_of(sensors))
+        self.drag = np.zeros(2)  # mean force across the thrust, m/s², east and north
         self.accel_bias_us: int | None = None
         self.gyro_bias_us: int | None = None
 
@@ -236,6 +237,7 @@ class Filter:
         """Forget the bias of the accelerometer for that of the model, or the reverse, and what it led astray."""
         self._forget_bias(ACCEL_BIAS, _MODELLED_M_S2 if modelled else self._sensors.accelerometer.turn_on_bias_m_s2)
         if modelled:
+            self.x[13:15] = -self.drag
             self._doubt_motion()
             update.inflate_covariance(self.P, POSITION + 2, 1, square(self.barometer.kind.test.innovation[0]))
 

@@ -21,6 +21,11 @@ NOMINAL = 23  # the nominal state has a quaternion for the attitude: later parts
 
 INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
 SAMPLE = 9  # columns of a sample: duration, s; mean specific force and rate; whether each is unknown or modelled
+ACROSS, ALONG, THRUST = (
+    1,
+    2,
+    3,
+)  # of a modelled force: drag across and along the rotors' axes, over that across in hover
 UNKNOWN, MODELLED = 1.0, 2.0  # with velocity or attitude constant; replaced by the model of the rotors
 
 _BLIND_FORCE_DENSITY = 3.0**2  # (m/s²)²/Hz: 3 m/s after a second without an accelerometer
@@ -67,7 +72,12 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
     q = (x[6], x[7], x[8], x[9])
     R = _matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
     fx, fy, fz = R[6] * gravity, R[7] * gravity, R[8] * gravity
-    if samples[row, BLIND_FORCE] != UNKNOWN:
+    if samples[row, BLIND_FORCE] == MODELLED:
+        fx, fy, fz = 0.0, 0.0, samples[row, THRUST]
+        M = _drag_matrix(R, samples, row)
+        for axis in range(3):
+            x[3 + axis] -= (M[axis, 0] * x[13] + M[axis, 1] * x[14] + M[axis, 2] * x[15]) * dt
+    elif samples[row, BLIND_FORCE] != UNKNOWN:
         fx = samples[row, FORCE] - x[13]
         fy = samples[row, FORCE + 1] - x[14]
         fz = samples[row, FORCE + 2] - x[15]
@@ -87,6 +97,19 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 
 
 @compiled
+def _drag_matrix(R: Nine, samples: Array, row: int) -> Array:
+    """Return the effect of the bias of a modelled force, ENU: horizontal drag in level hover, and vertical force."""
+    across, along = samples[row, ACROSS], samples[row, ALONG]
+    M = np.zeros((3, 3))
+    for j in range(2):
+        for i in range(3):
+            M[i, j] = (along - across) * R[3 * i + 2] * R[3 * j + 2]
+        M[j, j] += across
+    M[2, 2] = 1.0
+    return M
+
+
+@compiled
 def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravity: float) -> None:
     """Advance state and covariance in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
     noise, dt = packed[0], samples[row, INTERVAL]
@@ -101,6 +124,8 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
             a, b, c = R[3 * i], R[3 * i + 1], R[3 * i + 2]
             push[i, 0], push[i, 1], push[i, 2] = c * fy - b * fz, a * fz - c * fx, b * fx - a * fy
             lever[i, 0], lever[i, 1], lever[i, 2] = a * dt, b * dt, c * dt
+    if samples[row, BLIND_FORCE] == MODELLED:
+        put(_drag_matrix(R, samples, row) * dt, lever)
     unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -0.5 * turn[0], -0.5 * turn[1], -0.5 * turn[2]))
     for i in range(9):
         back[i // 3, i % 3] = unturned[i]

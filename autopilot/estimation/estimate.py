@@ -99,7 +99,7 @@ class FilterCheck(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """The vehicle at one instant; rates without bias, biases FLU, standard deviations ENU.
+    """The vehicle at one instant; rates without bias, biases FLU (of a modelled force ENU), standard deviations ENU.
 
     Attributes:
         resets: Number of resets of a part.

@@ -2,7 +2,7 @@
 
 from math import copysign, sqrt
 
-from colibri.autopilot.estimation.delay_buffer import DelayBuffer, roughness
+from colibri.autopilot.estimation.delay_buffer import DelayBuffer, learn_drag, roughness
 from colibri.autopilot.estimation.eskf import Filter
 from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.inertial import Inertial
@@ -28,6 +28,7 @@ class InertialWatch:
         """Check the waiting samples, and the tests of the filter; `rate_known`: the gyroscope is usable."""
         inertial, rough = self._inertial, self._rough
         parts = roughness(buffer.samples, buffer.first, len(buffer.waiting), _ROUGH_M_S2, _ROUGH_RAD_S)
+        learn_drag(buffer.samples, buffer.first, len(buffer.waiting), filter_.x, filter_.drag)
         for sensor, part in enumerate(parts):
             rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
         inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS

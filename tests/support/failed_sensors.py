@@ -58,12 +58,15 @@ class Outcome(NamedTuple):
 
 
 @contextmanager
-def airborne(wind_m_s: float, seed: int, *, quick: bool = True) -> Iterator[Sitl]:
+def airborne(
+    wind_m_s: float, seed: int, *, quick: bool = True, vehicle: str = "hummingbird", turbulence: str = ""
+) -> Iterator[Sitl]:
     profile = load_profile("flight")
     if quick:
         profile = replace(profile, simulation=replace(profile.simulation, frame_interval_s=None))
     setting = {"feedback": "sensors", "seed": seed, "profile": profile, "wind": f"{wind_m_s:g}@270", "strict": False}
-    with Flights(setting_of([setting]), None) as flights:
+    air = {"vehicle": vehicle, **({"turbulence": turbulence} if turbulence else {})}
+    with Flights(setting_of([setting, air]), None) as flights:
         flight = flights.begin()
         flight.takeoff(_HEIGHT_M)
         yield flight
@@ -115,10 +118,12 @@ def matrix(
     *,
     seed: int = 1,
     quick: bool = True,
+    vehicle: str = "hummingbird",
+    turbulence: str = "",
 ) -> Iterator[tuple[str, Outcome]]:
     """Fly all cases in all winds and situations, each in a fork; yield its name and outcome."""
     for wind_m_s in winds:
-        with airborne(wind_m_s, seed, quick=quick) as flight:
+        with airborne(wind_m_s, seed, quick=quick, vehicle=vehicle, turbulence=turbulence) as flight:
             for situation in situations:
                 for case, fields in _in_forks(flight, situation, cases):
                     yield f"{wind_m_s:g} m/s, {situation}, {case}", Outcome(*fields)
@@ -161,15 +166,17 @@ def main() -> int:
     parser.add_argument("--winds", type=float, nargs="*", default=WINDS)
     parser.add_argument("--situations", nargs="*", default=[*SITUATIONS])
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--vehicle", default="hummingbird")
+    parser.add_argument("--turbulence", default="")
     parser.add_argument("--slow", action="store_true", help="with all frames")
     parser.add_argument("--all", action="store_true", help="show all")
     args = parser.parse_args()
     cases: list[tuple[Fault, ...]] = [()] if args.none else pairs() if args.pairs else singles()
     cases = [case for case in cases if not args.only or any(name in " + ".join(map(str, case)) for name in args.only)]
     counts: Counter[str] = Counter()
-    for name, outcome in matrix(
-        cases[args.seed % args.part :: args.part], args.winds, args.situations, seed=args.seed, quick=not args.slow
-    ):
+    weather = {"vehicle": args.vehicle, "turbulence": args.turbulence}
+    cases = cases[args.seed % args.part :: args.part]
+    for name, outcome in matrix(cases, args.winds, args.situations, seed=args.seed, quick=not args.slow, **weather):
         counts[outcome.bad or "well"] += 1
         if outcome.bad or args.all:
             sys.stdout.write(f"{outcome.bad}: {name}: {outcome}\n")

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AT_REST, VehicleState
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, terminal
 from colibri.autopilot.control.vehicle_model.rotor_lag import SampledLag, follow, rotor_lag
 from colibri.common.compiled_rotations import rotation_matrix
@@ -123,10 +124,13 @@ class RotorWatch:
         self._kept.speeds[:] = speeds
 
     @property
-    def expected(self) -> tuple[float, float, float, float]:
-        """Specific force along z, m/s², and angular acceleration, rad/s², FLU, by the model of the rotors."""
-        force, p, q, r = (matvec(self._accelerations, self._kept.speeds**2)).tolist()
-        return force, p, q, r
+    def expected(self) -> tuple[float, float, float, float, float, float]:
+        """Drag across and along the rotors' axes, over that across in hover; thrust, m/s²; turn, rad/s², FLU."""
+        thrust, p, q, r = (matvec(self._accelerations, self._kept.speeds**2)).tolist()
+        air, weight = self._airframe, self._airframe.gravity_m_s2
+        now, hover = (air.drag_xy + air.rotor_drag * sqrt(air.mass_kg * max(each, 0.0)) for each in (thrust, weight))
+        across, along = (now / hover, air.drag_z / hover) if hover > 0.0 else (1.0, 1.0)
+        return across, along, thrust, p, q, r
 
     @property
     def push(self) -> float:
@@ -135,7 +139,7 @@ class RotorWatch:
         return max(abs(x), abs(y)) if self.lost is None else 0.0
 
     def adopt(self, vehicle: Vehicle) -> None:
-        self._battery = BatteryModel(vehicle)
+        self._battery, self._airframe = BatteryModel(vehicle), airframe_of(vehicle)
         lag = rotor_lag(vehicle, self._interval_s)
         signature = signature_of(vehicle)
         inertia = np.array([signature.mass_kg, *signature.inertia])

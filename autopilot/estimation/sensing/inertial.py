@@ -10,7 +10,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
 
-Expected: TypeAlias = tuple[float, float, float, float]  # specific force along z, angular acceleration, FLU
+Expected: TypeAlias = tuple[float, float, float, float, float, float]  # of a `MODELLED` force; turn, rad/s², FLU
 Sample = tuple[float, ...]  # columns of `eskf_predict.SAMPLE`
 
 _BEYOND_RANGE = 1.01  # tolerance for resolution at the end of the range
@@ -76,9 +76,9 @@ class Inertial:
         if (force_good and rate_good) or self.expected is None:
             self._turns = None
             return reading
-        thrust_m_s2, *turn = self.expected
+        across, along, thrust_m_s2, *turn = self.expected
         if not force_good:
-            reading = reading._replace(force=(0.0, 0.0, thrust_m_s2), force_modelled=True)
+            reading = reading._replace(force=(across, along, thrust_m_s2), force_modelled=True)
         if not rate_good:
             before_us, (p, q, r) = self._turns or (frame.time_us, reading.rate)
             dt = min((frame.time_us - before_us) * 1e-6, _MAX_STEP_S)
