@@ -65,6 +65,7 @@ class Behaviour:
     land_slow_below_m: float = 0.0
     stick_climb_m_s: float = 0.0
     stick_sink_m_s: float = 0.0
+    stick_lift_m_s2: float = 0.0
     uploaded_fence: bool = True
     floor_m: float = -inf
 

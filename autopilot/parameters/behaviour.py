@@ -35,6 +35,7 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
     "land_slow_below_m": lambda p: 0.01 * p["LAND_ALT_LOW"],
     "stick_climb_m_s": lambda p: 0.01 * p["PILOT_SPEED_UP"],
     "stick_sink_m_s": lambda p: 0.01 * (p["PILOT_SPEED_DN"] or p["PILOT_SPEED_UP"]),
+    "stick_lift_m_s2": lambda p: 0.01 * max(p["PILOT_ACCEL_Z"], 50.0),
     "uploaded_fence": lambda p: bool(p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _POLYGONS),
     "floor_m": lambda p: p["FENCE_ALT_MIN"] if p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _FLOOR else -inf,
 }

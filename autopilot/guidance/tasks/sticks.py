@@ -3,6 +3,7 @@
 from math import hypot
 from typing import TypeVar
 
+from colibri.autopilot.guidance.integrator_chain import lifting_at
 from colibri.autopilot.guidance.reference import BindingDerivative, still_target
 from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.mavlink.setpoints.setpoints import Sticks, turned
@@ -38,7 +39,9 @@ class PositionTask(EndlessTask):
         target = still_target((x, y, z), heading_rad, context.samples, (horizontally, horizontally, vertically))
         target.motion[:, 1] = (*moves, climbs)
         target.heading[:, 1] = turns
-        return PositionMotion(target._replace(turns=yaw_rad is not None), context.behaviour.limits)
+        lift_m_s2, limits = context.behaviour.stick_lift_m_s2, context.behaviour.limits
+        limits = lifting_at(limits, lift_m_s2) if lift_m_s2 else limits
+        return PositionMotion(target._replace(turns=yaw_rad is not None), limits)
 
 
 def kept(before: T | None, now: T, centred: bool, slow: bool) -> T | None:
