@@ -18,8 +18,8 @@ from colibri.mavlink.links.udp import UdpLink
 def command_line() -> ArgumentParser:
     parser = ArgumentParser(
         prog="colibri autopilot",
-        description="The autopilot: takes the vehicle's state, or what its sensors measure, from a plant and answers "
-        "with rotor commands, over MAVLink/UDP. Start `colibri plant` in another terminal, before or after.",
+        description="Run the autopilot. It receives the true state or sensor measurements from a plant and answers "
+        "with rotor commands, over MAVLink. Start `colibri plant` in another terminal, before or after.",
         epilog="Example: colibri autopilot --track spiral",
     )
     add_options(parser, AutopilotSpec)

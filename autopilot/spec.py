@@ -57,8 +57,8 @@ class LawSpec:
     delay: Annotated[
         float | None,
         Option(
-            "delay to compensate, from a frame until its command takes effect; 0: no compensation "
-            "(default: the profile's, or as measured by the plant)",
+            "compensated delay from a frame to the effect of its command; 0: no compensation "
+            "(default: the profile's, else as measured by the plant)",
             "MS",
             "ms",
             least=0.0,
@@ -69,7 +69,7 @@ class LawSpec:
         str | Vehicle | None, Option("vehicle to control, name or .toml (default: the profile's)", "NAME")
     ] = None
     floor: Annotated[
-        float | None, Option("height below which no track may lead, m (default: the ground, 0)", "M", "m", endless=True)
+        float | None, Option("lowest height that a track may have (default: the ground, 0)", "M", "m", endless=True)
     ] = None
     feedback: Annotated[
         Feedback, Option("input of the autopilot: the true state (default) or simulated sensors", "state|sensors")
@@ -115,35 +115,35 @@ class GroundSpec:
     gcs: Annotated[
         tuple[str, ...],
         Option(
-            "a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
+            "link to ground stations, which may also send commands: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
             "serial:DEVICE:BAUD",
             "URL",
             keyword=False,
         ),
     ] = ()
     signing_key: Annotated[
-        Path | None, Option("sign messages, and refuse messages without a signature of this key", "FILE", keyword=False)
+        Path | None, Option("sign messages with this key, and refuse unsigned messages", "FILE", keyword=False)
     ] = None
-    insecure: Annotated[bool, Option("let links leave this computer without a key", keyword=False)] = False
+    insecure: Annotated[bool, Option("allow links to other computers without a key", keyword=False)] = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
-    plant: Annotated[str, Option("the plant to call", "URL")] = DEFAULT_PLANT
+    plant: Annotated[str, Option("link to the plant", "URL")] = DEFAULT_PLANT
     simulator: Annotated[
         str | None,
-        Option("fly a simulator with PX4's interface on its sensors, for example jMAVSim: tcp:127.0.0.1:4560", "URL"),
+        Option("link to a simulator with PX4's interface and sensors, for example jMAVSim: tcp:127.0.0.1:4560", "URL"),
     ] = None
     track: Annotated[
         str | Trajectory | None,
-        Option("what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)", "TRACK"),
+        Option("track to fly, as in `colibri fly` (default spiral; with --gcs: none)", "TRACK"),
     ] = None
     stepped: Annotated[
-        str | None, Option("a program that speaks for all ground stations, frame by frame (for tests)", "URL")
+        str | None, Option("for tests: link to one program for all ground stations, frame by frame", "URL")
     ] = None
-    tlog: Annotated[bool, Option("append the frames of ground stations to flight.tlog in --out, too")] = False
-    home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
-    identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
+    tlog: Annotated[bool, Option("also append the frames of ground stations to flight.tlog in --out")] = False
+    home: Annotated[HomePlace, Option("origin, degrees and m", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
+    identity: Annotated[IdentityName, Option("identity for ground stations")] = "px4"
     state: Annotated[Path | None, Option("folder of parameters, logs and files (default: not kept)", "DIR")] = None
     strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
     events: Annotated[

@@ -23,10 +23,9 @@ DEFAULT_LINKS = {
 def command_line() -> ArgumentParser:
     parser = ArgumentParser(
         prog="colibri plant",
-        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
-        "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep, unless "
-        "--realtime: it waits for each answer, however long that takes. "
-        "Start `colibri autopilot` in another terminal, before or after.",
+        description="Simulate a vehicle and its environment. The plant sends the true state or sensor measurements to "
+        "the autopilot and receives rotor commands, over MAVLink. It waits for each command (lockstep), unless "
+        "--realtime is given. Start `colibri autopilot` in another terminal, before or after.",
         epilog="Example: colibri plant --duration 100 --out out/flight",
     )
     shown = {

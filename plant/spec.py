@@ -27,29 +27,29 @@ class WorldSpec:
 
     without: Annotated[
         tuple[Part, ...],
-        Option("leave a part of the vehicle file out of the plant's model; the autopilot keeps its own"),
+        Option("leave out a part of the plant's model; the autopilot's model keeps it"),
     ] = ()
     wind: Annotated[
         Wind | RecordedWind,
         Option(
-            "m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east; or a .csv file with "
-            f"a header of {COLUMNS} (s, m/s), linear in between (default: calm)",
+            "wind speed, m/s, and direction that it blows from, degrees clockwise from north: 5@270 is from the west; "
+            f"or a .csv file with header {COLUMNS} (s, m/s), interpolated linearly (default: calm)",
             "SPEED@FROM|FILE",
             read=read_wind,
         ),
     ] = NO_WIND
     gusts: Annotated[
-        tuple[Gust, ...], Option("a gust on top of the wind, of the shape 1 - cosine", GUST, read=gust, flag="gust")
+        tuple[Gust, ...], Option("add a gust of shape 1 - cosine to the wind", GUST, read=gust, flag="gust")
     ] = ()
     turbulence: Annotated[
         Intensity | None,
-        Option("Dryden turbulence on top of the wind, by MIL-F-8785C at low altitude; --seed chooses the sample"),
+        Option("add Dryden turbulence to the wind, by MIL-F-8785C at low altitude; random by --seed"),
     ] = None
     noise: Annotated[
         Mapping[str, float],
         Option(
-            "white noise on the body, force (N) and moment (N m), and on the motors (parts of each command), each for "
-            "a root of hertz and held over a frame: 0.1 is 1.6 N at 250 Hz; --seed chooses the sample",
+            "white noise of force (N) and moment (N m) on the body, and of motors (fraction of the command), per root "
+            "of hertz, constant within a frame: force=0.1 is 1.6 N RMS at 250 Hz; random by --seed",
             "KEY=VALUE,...",
             read=noise_values,
         ),
@@ -57,13 +57,13 @@ class WorldSpec:
     events: Annotated[
         tuple[Any, ...],
         Option(
-            f"at T seconds: {FORMS} (the last two need ground stations); or a file with tables [[events]]",
+            f"event at T seconds: {FORMS} (the last two need ground stations); or a file with tables [[events]]",
             EVENT,
             read=event,
             flag="event",
         ),
     ] = ()
-    seed: Annotated[int, Option("seed of everything random", "N", least=0)] = 0
+    seed: Annotated[int, Option("seed of all random numbers", "N", least=0)] = 0
     start: Annotated[
         Mapping[str, float],
         Option(
@@ -76,8 +76,8 @@ class WorldSpec:
     latency: Annotated[
         float,
         Option(
-            "simulated latency between plant and autopilot, one way: the command that answers a frame acts twice that "
-            "later, and the one before it is held until then",
+            "simulated one-way latency between plant and autopilot: a command takes effect two latencies after its "
+            "frame, and the previous one holds until then",
             "MS",
             "ms",
             least=0.0,
@@ -111,21 +111,19 @@ class PlantSpec(WorldSpec, ProcessSpec):
     serve: Annotated[
         Literal["colibri", "ardupilot-json", "px4"],
         Option(
-            "colibri: colibri autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, which "
-            "sets rate and speed itself; px4: PX4's SITL, over TCP, or UDP where it waits to be called (udpout:)"
+            "autopilot to serve: colibri (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, which "
+            "sets rate and speed; px4: PX4's SITL over TCP, or over UDP with --link udpout:HOST:PORT"
         ),
     ] = "colibri"
-    link: Annotated[str | None, Option("where to wait for the autopilot", "URL")] = None
+    link: Annotated[str | None, Option("link on which to wait for the autopilot", "URL")] = None
     vehicle: Annotated[str | Vehicle, Option("vehicle name or .toml", "NAME")] = "hummingbird"
     integrator: Annotated[
         Literal["rk4", "adaptive"], Option("rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9")
     ] = "rk4"
-    home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
-    rate: Annotated[float, Option("rate of frames, unless the autopilot requests another", "HZ", "Hz", above=0.0)] = (
-        250.0
-    )
+    home: Annotated[HomePlace, Option("origin, degrees and m", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
+    rate: Annotated[float, Option("frame rate, unless the autopilot requests another", "HZ", "Hz", above=0.0)] = 250.0
     realtime: Annotated[
-        bool, Option("run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command")
+        bool, Option("follow the wall clock as hardware does: wait for no answer, and hold the last command")
     ] = False
     cut_after: Annotated[
         float, Option("with --realtime: stop the rotors after this time without a command", "S", "s", above=0.0)
@@ -134,10 +132,10 @@ class PlantSpec(WorldSpec, ProcessSpec):
         float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
     ] = inf
     speed: Annotated[
-        float | None, Option("times real time, or max (default: max; with --realtime 1)", "N", above=0.0, endless=True)
+        float | None, Option("multiple of real time (default: max; with --realtime 1)", "N", above=0.0, endless=True)
     ] = None
-    tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog in --out, too")] = False
-    truth: Annotated[bool, Option("append the true state to each frame, for a program in between (for tests)")] = False
+    tlog: Annotated[bool, Option("also write each MAVLink frame to flight.tlog in --out")] = False
+    truth: Annotated[bool, Option("for tests: append the true state to each frame")] = False
 
     @property
     def pace(self) -> float:

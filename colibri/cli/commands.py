@@ -28,43 +28,43 @@ _TEXTS = {
         "fly cli.viewing": """fly a track and report how well it went
             colibri fly spiral                                # report and figures in out/
             colibri fly lemniscate:lap=5 --wind 5@270         # in wind from the west
-            colibri fly circle --feedback sensors --seed 3    # by estimates""",
-        "sitl cli.viewing": """stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy
+            colibri fly circle --feedback sensors --seed 3    # on simulated sensors""",
+        "sitl cli.viewing": """start a simulated vehicle for QGroundControl, MAVSDK or MAVProxy
             colibri sitl                                      # then start QGroundControl
             colibri sitl --count 3                            # a fleet of three
             colibri sitl --feedback sensors --turbulence light --speed 1""",
-        "view cli.viewing": """see flights, or a MAVLink vehicle, fly in a browser
+        "view cli.viewing": """show flights, or a live MAVLink vehicle, in a browser
             colibri view out/spiral
             colibri view out/spiral out/other    # two flights in one picture
             colibri view udpin:127.0.0.1:14550""",
-        "plot cli.viewing": """draw the figures of a flight, however it ended
+        "plot cli.viewing": """draw the figures of a recorded flight
             colibri plot out/spiral""",
         "export cli.viewing": """write the topics of a flight's ULog as MCAP, CSV or Parquet
             colibri export out/spiral --mcap           # for Foxglove
             colibri export out/spiral --csv            # a table of each topic""",
-        "replay flights.replay": """replay a recorded flight, and compare the autopilot's answers
+        "replay flights.replay": """replay a recorded flight and compare the rotor commands
             colibri replay out/spiral""",
     },
     "many flights": {
-        "campaign cli.campaign": """fly every combination of factors, by many seeds, into one table
+        "campaign cli.campaign": """fly every combination of factors with many seeds; write one table
             colibri campaign mass.toml --out out/mass
-            colibri campaign mass.toml --out out/mass --resume    # go on with it
+            colibri campaign mass.toml --out out/mass --resume    # continue it
             colibri campaign --track spiral --set feedback=state,sensors --seeds 1-10""",
         "tune cli.tune": """tune numbers of a profile, and validate them on other seeds
             colibri tune weights.toml --out out/tune
-            colibri tune weights.toml --out out/tune --resume     # go on, or join""",
-        "compare studies.comparison": """fly several controllers on several tracks, side by side
+            colibri tune weights.toml --out out/tune --resume     # continue, or join""",
+        "compare studies.comparison": """compare control laws on several tracks
             colibri compare --profile flight --profile se3 --track spiral
             colibri compare --track circle --seeds 1-20 --turbulence light""",
-        "arena arena.run": """fly control laws on a set's tracks and disturbances, beside published values
+        "arena arena.run": """compare control laws with published results on the same tracks
             colibri arena race --law agile --law my_law.py:Law    # cells of SSI-MPC
             colibri arena robust policy --starts 1""",
-        "study studies.studies": """fly the studies of profile flight, and draw them
+        "study studies.studies": """fly the studies of profile flight and draw their figures
             colibri study speed robustness    # two of the studies; without a name all""",
         "figures studies.thesis_figures": """fly the thesis's flights and draw its figures
             colibri figures --only 4.9""",
     },
-    "vehicles of others": {
+    "other vehicles": {
         "companion companion.process": """fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion
             colibri companion spiral --vehicle udpin:127.0.0.1:14540 --dry-run
             colibri companion circle --vehicle udpin:127.0.0.1:14540 --arm""",
@@ -73,13 +73,13 @@ _TEXTS = {
             colibri vehicle hummingbird --for px4 --out hummingbird.params""",
     },
     "control laws": {
-        "check-controller conformance.check:command": """check a control law against the requirements on all of them
+        "check-controller conformance.check:command": """test a control law against the requirements for all laws
             colibri check-controller geometric-se3
             colibri check-controller lpv-mpc --only memory --only limits""",
-        "gym gym.export": """write a learned policy's inputs and outputs, so that it flies as a control law
+        "gym gym.export": """describe a learned policy, so that it can fly as a control law
             colibri gym export policy.onnx    # then: fly --controller policy.onnx
             colibri gym export policy.onnx --env colibri/Hover-v0 --set action=rates""",
-        "certify certification.report": """certify a profile's attitude law
+        "certify certification.report": """compute a Lyapunov certificate of a profile's attitude law
             colibri certify flight --controller lpv-mpc""",
     },
     "profiles and vehicles": {
@@ -88,18 +88,18 @@ _TEXTS = {
             colibri show vehicle hummingbird"""
     },
     "this computer": {
-        "compile cli.compilation": """compile what flights and flight tests need, beforehand
+        "compile cli.compilation": """compile the machine code of flights and tests in advance
             colibri compile           # once after installation, in CI before pytest
             colibri compile flight    # only what a flight with the profile flight needs""",
-        "doctor doctor": """look whether everything is there that flights need
+        "doctor doctor": """check that Colibri can fly on this computer
             colibri doctor
-            colibri doctor --gcs    # wait for a ground station, too""",
-        "bench bench.run": """measure how fast it flies
+            colibri doctor --gcs    # also test the link to a ground station""",
+        "bench bench.run": """measure the speed of control steps and flights
             colibri bench --only commands
             colibri bench --only stages --runs 1""",
-        "verify verification.verify": """fly a fixed set of flights: is every bit the same, twice, or as it once was?
+        "verify verification.verify": """check that flights are equal bit for bit, twice or to recorded hashes
             colibri verify --link memory""",
-        "completion cli.completion": """print a script that completes these commands in a shell
+        "completion cli.completion": """print a script for command completion in a shell
             colibri completion bash > ~/.local/share/bash-completion/completions/colibri
             colibri completion zsh > ~/.zfunc/_colibri""",
     },
@@ -118,8 +118,8 @@ def _entries(texts: dict[str, str]) -> Iterator[tuple[str, CommandEntry]]:
 GROUPS = {group: dict(_entries(texts)) for group, texts in _TEXTS.items()}
 COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}
 PROCESSES = {
-    "plant": "the vehicle and its world, waiting for an autopilot",
-    "autopilot": "the autopilot, calling a plant",
+    "plant": "simulate a vehicle, and wait for an autopilot",
+    "autopilot": "run the autopilot, and connect it to a plant",
 }
 """The two processes of a flight, with command lines of their own."""
 
@@ -159,7 +159,7 @@ def parser_of(*whole: str) -> ArgumentParser:
         formatter_class=_Grouped,
     )
     parser.add_argument("--version", action=Version, nargs=0, help="print the version")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of those below")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of the commands below")
     for name, command in COMMANDS.items():
         examples = f"examples:\n{indent(command.examples, '  ')}"
         options = commands.add_parser(name, help=command.does, description=command.does, epilog=examples)
@@ -178,7 +178,7 @@ def _listed() -> str:
         lines.append(f"{group}:")
         for name, does in commands.items():
             lines += wrap(does, width - 2, initial_indent=f"  {name:<{_NAME}}", subsequent_indent=" " * (_NAME + 2))
-    return "\n".join([*lines, "", "colibri COMMAND --help says more of each."])
+    return "\n".join([*lines, "", "colibri COMMAND --help prints the options and examples of a command."])
 
 
 def add_options(name: str, parser: ArgumentParser) -> None:

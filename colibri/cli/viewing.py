@@ -16,7 +16,7 @@ def fly(args: Namespace) -> int:
     with loading():
         from colibri.cli.flying import fly as flown
     if args.view and args.link != "udp":
-        fail(f"--view needs --link udp: over {args.link} no autopilot process runs")
+        fail(f"--view needs --link udp: with --link {args.link} there is no autopilot process")
     with _viewed(args, args.gcs):
         return flown(args)
 
@@ -34,9 +34,9 @@ def sitl(args: Namespace) -> int:
 def view(args: Namespace) -> int:
     links = [what for what in args.what if what.startswith(_LINKS)]
     if links and len(args.what) > 1:
-        fail("one link, or folders of flights: a live vehicle and others are not shown together")
+        fail("a live vehicle is shown alone: give one link, or folders of flights")
     if links and args.export:
-        fail("--export writes flights that are over: give their folders")
+        fail("--export writes recorded flights: give their folders")
     if args.port > 65535:
         fail(f"--port: must be from 0 to 65535, not {args.port}")
     recorded = not links and not args.export

@@ -31,29 +31,29 @@ def ports(instance: int) -> dict[str, int]:
 class FleetSpec(VehiclesSpec, GroundSpec):
     """Vehicles for ground stations to connect to."""
 
-    instance: Annotated[int, Option("number of the (first) vehicle: its system id is N + 1", "N", least=0)] = 0
-    count: Annotated[int, Option("how many vehicles", "N", least=0)] = 1
+    instance: Annotated[int, Option("number of the first vehicle; its system id is N + 1", "N", least=0)] = 0
+    count: Annotated[int, Option("number of vehicles", "N", least=0)] = 1
     home: Annotated[
         HomePlace,
-        Option("where they stand, degrees and m, yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
+        Option("origin, degrees and m; yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
     ] = DEFAULT_HOME
     spacing: Annotated[
-        float, Option("how far each vehicle of a fleet stands east of the one before", "M", "m", least=0.0)
+        float, Option("distance between the vehicles of a fleet, in a row to the east", "M", "m", least=0.0)
     ] = 3.0
-    identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
-    state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
+    identity: Annotated[IdentityName, Option("identity for ground stations")] = "px4"
+    state: Annotated[Path, Option("folder for parameters and logs", "DIR")] = Path("out/sitl")
     out: Annotated[
         Path | None,
-        Option("record the logs of both processes in DIR/N, for `colibri replay` (default: no record)", "DIR"),
+        Option("folder for the logs of vehicle N in DIR/N, for `colibri replay` (default: none)", "DIR"),
     ] = None
     plant_port: Annotated[
-        int | None, Option("the plant's (default: 14560 + N; 0: any that is free)", "PORT", least=0, most=65535)
+        int | None, Option("UDP port of the plant (default: 14560 + N; 0: any free one)", "PORT", least=0, most=65535)
     ] = None
-    speed: Annotated[float, Option("times real time, or max", "N", above=0.0, endless=True)] = 1.0
+    speed: Annotated[float, Option("multiple of real time, or max", "N", above=0.0, endless=True)] = 1.0
     duration: Annotated[
         float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
     ] = inf
-    strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
+    strict: Annotated[bool, Option("end at an exception in flight (default: replace the failed part)")] = False
 
     def folder(self, instance: int) -> Path | None:
         return None if self.out is None else self.out / str(instance)

@@ -19,7 +19,7 @@ TRACK_HELP = (
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
     "circle[:radius=2,speed=2,height=2,yaw=path|fixed], ramped[:curve=circle,speed=5,acceleration=0.25,radius=5,"
     "turn=left|right,heading=0], waypoints:FILE[,speed=2|max,margin=0.1,tolerance=M], "
-    "samples:FILE; m, s, degrees"
+    "samples:FILE; lengths in m, times in s, angles in degrees"
 )
 
 
@@ -72,7 +72,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
     """The law and its vehicle, the plant and its world."""
 
     plant_vehicle: Annotated[
-        str | Vehicle | None, Option("another vehicle for the plant, to test the law with a wrong model", "NAME")
+        str | Vehicle | None, Option("vehicle of the plant, to test the law with a wrong model", "NAME")
     ] = None
 
 
@@ -84,26 +84,26 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     params: Annotated[
         tuple[Any, ...],
         Option(
-            "set a parameter of the autopilot before the flight: of control law and vehicle model; with --gcs, of all",
+            "set a parameter of control law or vehicle model before the flight; with --gcs, any parameter",
             "NAME=VALUE",
             read=parameter,
             flag="set",
         ),
     ] = ()
-    integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
+    integrator: Annotated[
+        Literal["rk4", "adaptive"] | None, Option("integrator of the plant (default: the profile's)")
+    ] = None
     link: Annotated[
         Literal["udp", "memory", "direct"],
-        Option("udp: two processes; memory: one process, same codec, same flight; direct: without the codec"),
+        Option("udp: two processes; memory: the same flight in one process; direct: also without MAVLink"),
     ] = "memory"
     speed: Annotated[
-        float | None, Option("times real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True)
+        float | None, Option("multiple of real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True)
     ] = None
     duration: Annotated[float, Option("simulated time", "S", "s", above=0.0)] = 100.0
     window: Annotated[
         Window | None,
-        Option(
-            "also report mean, RMS and maximum of the error in this part of the flight, s", "BEGIN:END", read=window_of
-        ),
+        Option("also report mean, RMS and maximum of the error between these times, s", "BEGIN:END", read=window_of),
     ] = None
     out: Annotated[Path, Option("folder for logs and figures", "DIR", keyword=False)] = Path("out")
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False

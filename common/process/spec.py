@@ -11,13 +11,13 @@ from colibri.common.process.lifecycle import end_with, fail
 from colibri.common.spec import Option, SpecError, from_json, from_namespace
 
 S = TypeVar("S")
-_BOOT = "Unix time at simulated time 0, for the dates of telemetry logs; the same for plant and autopilot"
+_BOOT = "Unix time at simulated time 0, for dates in telemetry logs; the same for plant and autopilot"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessSpec:
-    system_id: Annotated[int, Option("MAVLink system", "ID", least=1, most=255)] = 1
-    out: Annotated[Path | None, Option("write flight.ulg there", "DIR")] = None
+    system_id: Annotated[int, Option("MAVLink system id", "ID", least=1, most=255)] = 1
+    out: Annotated[Path | None, Option("folder for flight.ulg", "DIR")] = None
     boot_unix_us: Annotated[int, Option(_BOOT, "N", "µs", least=0)] = 0
 
 
@@ -30,8 +30,8 @@ class Starter(NamedTuple):
 
 def add_process_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("--json", action="store_true", help="status as JSON lines on standard output")
-    add("--parent", type=int, metavar="PID", help="end when that process, which started this one, ends")
+    add("--json", action="store_true", help="print status as JSON lines")
+    add("--parent", type=int, metavar="PID", help="end when the process with this id ends")
     add("--spec", action="store_true", help=SUPPRESS)
 
 
