@@ -160,20 +160,15 @@ class StreamRates:
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        served = self._served
-        for channel in self._new:
-            for name, number in _STREAMS.items():
-                if self._rates[name]:
-                    served.streams.set_group(channel, number, self._rates[name], now_us)
-        self._new.clear()
-        if served.parameters.revision != self._revision:
-            self._revision = served.parameters.revision
-            for name, number in _STREAMS.items():
-                rate = int(served.parameters[f"SR0_{name}"])
-                if rate != self._rates[name]:
-                    self._rates[name] = rate
-                    for channel in served.streams.channels:
-                        served.streams.set_group(channel, number, rate, now_us)
+        served, new = self._served, self._new
+        if served.parameters.revision == self._revision and not new:
+            return ()
+        self._revision, self._new = served.parameters.revision, []
+        for name, number in _STREAMS.items():
+            rate, before = int(served.parameters[f"SR0_{name}"]), self._rates[name]
+            self._rates[name] = rate
+            for channel in served.streams.channels if rate != before else new if rate else ():
+                served.streams.set_group(channel, number, rate, now_us)
         return ()
 
 
