@@ -135,6 +135,7 @@ def _value(chance: random.Random, parameter: Parameter) -> Value:
     return round(drawn) if parameter.kind is ParamType.INT else drawn
 
 
+_SAID = (", terminate", ", at an unknown speed")
 MAX_IMPACT_M_S = 4.0
 """The vehicle reports 3 m/s, by its estimate."""
 MAX_TILT_DEG = 75.0
@@ -191,7 +192,7 @@ class _JudgedFlight:
             return ""
         if self._case.lands:
             return f"{self._impact}, though at most one sensor had failed"
-        said = any(text.startswith("Impact") or text.endswith(", terminate") for text in self.flight.texts)
+        said = any(text.startswith("Impact") or text.endswith(_SAID) for text in self.flight.texts)
         return "" if said else f"{self._impact}, unsaid"
 
     def _fly(self) -> str:

@@ -181,6 +181,7 @@ class Pilot:
         self.lag_us += sensed.waited_us
         self.generator.wait(sensed.waited_us * 1e-6, sensed.path_speed)
         self.sensed = sensed
+        self.ground.drifts = not sensed.position_known
 
     def context(self) -> TaskContext:
         now_us, vehicle, steered, position_known, delay_us, *_ = self.sensed

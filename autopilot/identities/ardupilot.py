@@ -158,7 +158,7 @@ _TEXTS: tuple[tuple[str, str | Callable[[Match[str]], str]], ...] = (
     (r"^item (\d+) of the mission", lambda found: f"item {int(found[1]) + 1} of the mission"),
     (r"^Mission RTL item: .*", ""),
     (r"^Takeoff (altitude reached: |detected).*", ""),
-    (r"^Landing detected$", ""),
+    (r"^Landing detected.*", ""),
     (r"^(Arm|PreArm): outside the geofence", r"\1: Vehicle breaching Polygon fence"),
     (r"^(Arm|PreArm): more than [\d.]+ m (from|above) home", r"\1: Vehicle breaching fence"),
     (r"^Failsafe cleared: (battery|setpoints).*", ""),

@@ -43,7 +43,13 @@ class GroundRecord(NamedTuple):
 
 
 class GroundContact:
-    """Ground contact of one vehicle; `impact` is text, empty for a landing, `height_m` the last z of ENU on ground."""
+    """Ground contact of one vehicle.
+
+    Attributes:
+        impact: Text, empty for a landing.
+        drifts: Whether its position, and with that its speed, is unknown.
+        height_m: Last z of ENU on the ground.
+    """
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
@@ -51,6 +57,7 @@ class GroundContact:
         self._lack, self._hardest = Lack(), Hardest()
         self._motions: deque[Motion] = deque(maxlen=KNOCK_SAMPLES)
         self.impact = ""
+        self.drifts = False
         self.standing = self.idles = True
         self.height_m = 0.0
         self.times = FlightTimes()
@@ -94,7 +101,7 @@ class GroundContact:
         if self.impact:
             self._lines.say(CRITICAL, self.impact)
         else:
-            self._lines.say(NOTICE, "Landing detected")
+            self._lines.say(NOTICE, "Landing detected" + (", at an unknown speed" if self.drifts else ""))
 
     def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
         """Detect ground in flight; return whether the vehicle fell below the wanted height."""

@@ -34,6 +34,7 @@ def test_without_a_position_it_lands_and_does_not_hold(sitl: Sitl) -> None:
     refused(sitl, "the position is not known", sitl.select, Mode.HOLD)
     sitl.wait_until(lambda: not sitl.armed, within=30.0)
     assert sitl.inside.copter.pilot.ground.standing
+    assert sitl.said("Landing detected, at an unknown speed")
 
 
 @ON_SENSORS
