@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
-from colibri.common.process.lifecycle import gc_frozen, use_one_thread
+from colibri.common.process.lifecycle import gc_frozen, loading, use_one_thread
 from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
 from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
@@ -22,7 +22,7 @@ from colibri.mavlink.wire.dialect import Bits, Codec, mav
 from tools.fuzz.messages import COMMANDS, Messages
 from tools.fuzz.vehicle import HIGH, BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
-from tools.harness.frame_times import FrameTimes, gc_off
+from tools.harness.frame_times import FrameTimes
 
 TO = (SYSTEM, COMPONENT)
 STATIONS = 32
@@ -325,7 +325,7 @@ def main() -> int:
     worst = 0.0
     for name, request in REQUESTS.items():
         if not args.only or any(part in name for part in args.only):
-            times = min(_times(request, gc_off, FRAMES_AFTER) for _ in range(args.repeat))
+            times = min(_times(request, loading, FRAMES_AFTER) for _ in range(args.repeat))
             worst = max(worst, times[0])
             _print(name, *times)
     if args.random and not args.only:

@@ -18,7 +18,7 @@ from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.common.process.lifecycle import use_one_thread
+from colibri.common.process.lifecycle import loading, use_one_thread
 from colibri.common.types import Vector
 from colibri.mavlink.hil import faults
 from colibri.mavlink.parameters.store import Parameter, ParamType, Value
@@ -29,7 +29,7 @@ from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.session import Flights
 from colibri.sitl.stepping import NotInTimeError
 from colibri.sitl.vehicle import Sitl
-from tools.harness.frame_times import FrameTimes, gc_off
+from tools.harness.frame_times import FrameTimes
 
 VEHICLES = ("hummingbird", "hummingbird-rangefinder", "iris", "jmavsim")
 MODES = (Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.MISSION, Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
@@ -331,7 +331,7 @@ def main() -> int:
 
 def _flown(case: RandomFlight) -> tuple[RandomFlightOutcome, float]:
     """Return a flight and its longest frame, ms, of two flights if it seems too long."""
-    with gc_off():
+    with loading():
         verdict = fly(case)
         frames_s = verdict.frames_s
         if max(frames_s, default=0.0) * 1e3 > MAX_FRAME_MS:

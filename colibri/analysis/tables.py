@@ -43,8 +43,9 @@ def print_table(title: str, headings: Row, rows: Sequence[Row], *, names: int) -
     table = Table(title=title, title_justify="left")
     for number, heading in enumerate(headings):
         table.add_column(heading.replace(" (", "\n("), justify="left" if number < names else "right", no_wrap=True)
+    groups = len({row[0] for row in rows}) < len(rows)  # else a line would follow each row
     for row, following in zip(rows, [*rows[1:], ("",)], strict=True):
-        table.add_row(*row, end_section=following[0] != row[0])
+        table.add_row(*row, end_section=groups and following[0] != row[0])
     needed = Console(width=_MAX_WIDTH).measure(table).maximum
     Console(width=max(Console().width, needed)).print(table)
 

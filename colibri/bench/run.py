@@ -4,16 +4,16 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
+from colibri.analysis.tables import Row, print_table
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.costs import (
@@ -41,6 +41,8 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 
 PROFILE = "flight"
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
+Table: TypeAlias = tuple[str, Row, list[Row]]
+"""Title, headings and rows."""
 _SPREAD, _QUANTILES = ("min", "median", "max"), ("p50", "p99")
 
 
@@ -70,9 +72,8 @@ def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
         figures |= {name: measure() for name, measure in measures.items() if name in wanted}
     if args.out:
         _write(args.out, json.dumps(figures, indent=2, ensure_ascii=False) + "\n")
-    console = Console()
     for table in _tables(figures):
-        console.print(table)
+        print_table(*table, names=1)
     return 0
 
 
@@ -136,10 +137,9 @@ def _tables(figures: Mapping[str, Any]) -> Iterator[Table]:
 
 
 def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
-    table = _table(title, [f"N = {horizon}" for horizon in figures])
-    for name in next(iter(figures.values())):
-        table.add_row(name, *(_of_stage(measured[name]) for measured in figures.values()))
-    return table
+    names = next(iter(figures.values()))
+    rows = [(name, *(_of_stage(measured[name]) for measured in figures.values())) for name in names]
+    return title, ("", *(f"N = {horizon}" for horizon in figures)), rows
 
 
 def _of_stage(figure: Mapping[str, float]) -> str:
@@ -150,18 +150,8 @@ def _of_stage(figure: Mapping[str, float]) -> str:
 def _columns(
     title: str, rows: Mapping[str, Mapping[str, float]], names: Sequence[str], headings: Sequence[str] = ()
 ) -> Table:
-    table = _table(title, headings or names)
-    for row, figure in rows.items():
-        table.add_row(row, *(_number(figure[name]) for name in names))
-    return table
-
-
-def _table(title: str, columns: Iterable[str]) -> Table:
-    table = Table(title=title, title_justify="left")
-    table.add_column("")
-    for column in columns:
-        table.add_column(column, justify="right")
-    return table
+    cells = [(row, *(_number(figure[name]) for name in names)) for row, figure in rows.items()]
+    return title, ("", *(headings or names)), cells
 
 
 def _number(value: float) -> str:

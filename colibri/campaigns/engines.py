@@ -71,8 +71,8 @@ class Pool:
         waiting: dict[Future[Any], Job] = {}
         broken: list[Job] = []
         try:
-            while not broken:
-                for job in jobs:
+            while True:
+                for job in () if broken else jobs:
                     try:
                         waiting[pool.submit(_do, job)] = job
                     except BrokenProcessPool:
@@ -87,11 +87,6 @@ class Pool:
                         broken.append(job)
                     else:
                         yield job, future.result()
-            for future, job in waiting.items():  # the pool broke: of the rest each has its result or never will
-                if isinstance(future.exception(), BrokenProcessPool):
-                    broken.append(job)
-                else:
-                    yield job, future.result()
         except BaseException:
             for child in set(active_children()) - others:
                 child.kill()

@@ -1,8 +1,6 @@
 """The time that each frame takes of an autopilot."""
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from time import thread_time
 from typing import Any
 
@@ -24,13 +22,3 @@ class FrameTimes(list[float]):
             return outcome
 
         return timed
-
-
-@contextmanager
-def gc_off() -> Iterator[None]:
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
