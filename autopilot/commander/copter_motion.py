@@ -92,7 +92,8 @@ class CopterMotion(MotionCommands):
         if (pilot.ground.standing or lifts) and self._modes.shown.number in (LOITER, POSHOLD, ALT_HOLD):
             context = pilot.context()
             up_m = pilot.ground.height_m + height_m + _ARRIVES_WITHIN_M
-            self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, context.behaviour.stick_climb_m_s or None))
+            limits = context.behaviour.stick_limits
+            self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, limits and limits.climb_m_s))
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         if not self.guided:

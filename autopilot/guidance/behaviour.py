@@ -63,9 +63,7 @@ class Behaviour:
     stick_landings_end: bool = True
     land_high_m_s: float = 0.0
     land_slow_below_m: float = 0.0
-    stick_climb_m_s: float = 0.0
-    stick_sink_m_s: float = 0.0
-    stick_lift_m_s2: float = 0.0
+    stick_limits: Limits | None = None  # of climbs by stick; None: `limits`
     uploaded_fence: bool = True
     floor_m: float = -inf
 

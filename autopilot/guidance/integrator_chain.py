@@ -58,11 +58,6 @@ def climbing_at(limits: Limits, climb_m_s: float) -> Limits:
     return limits._replace(climb_m_s=climb_m_s)
 
 
-@lru_cache(maxsize=64)
-def lifting_at(limits: Limits, lift_m_s2: float) -> Limits:
-    return limits._replace(lift_m_s2=lift_m_s2)
-
-
 class Axes(NamedTuple):
     """Axes `first` to before `last`, with their limits."""
 

@@ -33,9 +33,6 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
     "stick_landings_end": lambda p: bool(int(p["PILOT_THR_BHV"]) & _ENDS_LANDED),
     "land_high_m_s": lambda p: 0.01 * p["LAND_SPEED_HIGH"],
     "land_slow_below_m": lambda p: 0.01 * p["LAND_ALT_LOW"],
-    "stick_climb_m_s": lambda p: 0.01 * p["PILOT_SPEED_UP"],
-    "stick_sink_m_s": lambda p: 0.01 * (p["PILOT_SPEED_DN"] or p["PILOT_SPEED_UP"]),
-    "stick_lift_m_s2": lambda p: 0.01 * max(p["PILOT_ACCEL_Z"], 50.0),
     "uploaded_fence": lambda p: bool(p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _POLYGONS),
     "floor_m": lambda p: p["FENCE_ALT_MIN"] if p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _FLOOR else -inf,
 }
@@ -61,10 +58,14 @@ def behaviour(parameters: Parameters) -> Behaviour:
             changed[field] = bool(value)
         else:
             changed[field] = value * row.scale if isinstance(value, float) else value
+    found = {field: changed.pop(field) for field in Limits._fields if field in changed}
+    limits = changed["limits"] = _BEHAVIOUR.limits._replace(**found)
     if "RTL_LOIT_TIME" in parameters:
         changed |= {field: value(parameters) for field, value in BY_IDENTITY.items()}
-    limits = {field: changed.pop(field) for field in Limits._fields if field in changed}
-    return replace(_BEHAVIOUR, **changed, limits=_BEHAVIOUR.limits._replace(**limits))
+        up, down, lift = (0.01 * parameters[f"PILOT_{name}"] for name in ("SPEED_UP", "SPEED_DN", "ACCEL_Z"))
+        up = up or limits.climb_m_s
+        changed["stick_limits"] = limits._replace(climb_m_s=up, sink_m_s=down or up, lift_m_s2=max(lift, 0.5))
+    return replace(_BEHAVIOUR, **changed)
 
 
 def _default(row: Number) -> Value:

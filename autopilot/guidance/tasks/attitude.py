@@ -4,7 +4,6 @@ import numpy as np
 
 from colibri.autopilot.guidance.attitude_reference import STICK_MIDDLE, AttitudeReference, ReferenceMemory, tilt_command
 from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
-from colibri.autopilot.guidance.integrator_chain import lifting_at
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, lead, moving_with, still_target
 from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
@@ -133,8 +132,7 @@ def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -
         place, context.yaw_rad, context.samples, (BindingDerivative.VELOCITY, BindingDerivative.VELOCITY, kind)
     )
     target.motion[:, 1, 2] = climb_m_s
-    lift_m_s2, limits = context.behaviour.stick_lift_m_s2, context.behaviour.limits
-    limits = lifting_at(limits, lift_m_s2) if lift_m_s2 else limits
+    limits = context.behaviour.stick_limits or context.behaviour.limits
     _, after = lead(context.reference, target, limits, context.interval_s)
     moved = moving_with(context.state).motion
     moved[:, 2] = after.motion[:, 2]

@@ -3,7 +3,6 @@
 from math import hypot
 from typing import TypeVar
 
-from colibri.autopilot.guidance.integrator_chain import lifting_at
 from colibri.autopilot.guidance.reference import BindingDerivative, still_target
 from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.mavlink.setpoints.setpoints import Sticks, turned
@@ -39,8 +38,7 @@ class PositionTask(EndlessTask):
         target = still_target((x, y, z), heading_rad, context.samples, (horizontally, horizontally, vertically))
         target.motion[:, 1] = (*moves, climbs)
         target.heading[:, 1] = turns
-        lift_m_s2, limits = context.behaviour.stick_lift_m_s2, context.behaviour.limits
-        limits = lifting_at(limits, lift_m_s2) if lift_m_s2 else limits
+        limits = context.behaviour.stick_limits or context.behaviour.limits
         return PositionMotion(target._replace(turns=yaw_rad is not None), limits)
 
 
@@ -62,10 +60,8 @@ def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
 
 def stick_climb(sticks: Sticks, context: TaskContext) -> float:
     up = dead(2.0 * sticks.thrust - 1.0)
-    behaviour = context.behaviour
-    if up > 0.0:
-        return up * (behaviour.stick_climb_m_s or behaviour.limits.climb_m_s)
-    return up * (behaviour.stick_sink_m_s or behaviour.limits.sink_m_s)
+    limits = context.behaviour.stick_limits or context.behaviour.limits
+    return up * (limits.climb_m_s if up > 0.0 else limits.sink_m_s)
 
 
 def without_play(sticks: Sticks) -> Sticks:

@@ -56,12 +56,9 @@ def test_defaults_are_arducopters() -> None:
     flies = behaviour(parameters_of())
     assert flies.limits.speed_m_s == pytest.approx(10.0)
     assert (flies.return_height_m, flies.land_speed_m_s, flies.disarm_on_ground_s) == pytest.approx((15.0, 0.5, 10.0))
-    assert (flies.return_delay_s, flies.return_cone, flies.stick_lift_m_s2, flies.uploaded_fence) == (
-        5.0,
-        3.0,
-        2.5,
-        False,
-    )
+    assert (flies.return_delay_s, flies.return_cone, flies.uploaded_fence) == (5.0, 3.0, False)
+    assert flies.stick_limits is not None
+    assert (flies.stick_limits.climb_m_s, flies.stick_limits.lift_m_s2) == (2.5, 2.5)
     assert (flies.copter_items, flies.rally_only, round(flies.hover_throttle, 2)) == (True, False, 0.39)
 
 

@@ -129,7 +129,11 @@ def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
 
 @pytest.mark.parametrize("kind", [Behaviour, Limits])
 def test_every_number_of_the_behaviour_is_a_parameter(kind: Any) -> None:
-    names = set(Limits._fields) if kind is Limits else {field.name for field in fields(Behaviour)} - {"limits"}
+    names = (
+        set(Limits._fields)
+        if kind is Limits
+        else {field.name for field in fields(Behaviour)} - {"limits", "stick_limits"}
+    )
     assert names <= {row.path[-1] for row in ROWS} | set(BY_IDENTITY)
 
 
