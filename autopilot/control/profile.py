@@ -29,9 +29,9 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
     position_enu_m: tuple[float, float, float] | None = None
     """Without it, at the track's first point."""
     rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)] | None = None
-    """Of every rotor, in turns per minute. Without it, that of hover."""
+    """Initial speed of every rotor, rpm. Without it, the hover speed."""
     frame_interval_s: ControlInterval | None = None
-    """Between two frames of the plant at most: they divide the control interval. Without it, that interval."""
+    """Largest interval between plant frames; a divisor of the control interval, which is the default."""
 
     def rotor_speed(self, vehicle: Vehicle) -> float:
         """Return the rotor speed at the start, in the vehicle's unit."""
@@ -43,9 +43,9 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     name: str = ""
     controller: str
-    """The control law that flies, by the name it is registered under."""
+    """Registered name of the control law."""
     references: References
-    """Velocity and yaw from the track's formula, or by backward differences as in the thesis."""
+    """Derivatives of references: from the track's formula, or by backward differences as in the thesis."""
     delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=0.2)] | None = None
     """Delay to compensate, from a frame until its command takes effect; None: as measured by the plant."""
     controllers: dict[str, dict[str, Any]]

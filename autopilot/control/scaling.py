@@ -28,20 +28,20 @@ class LpvMpcScaling(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Bases and ratios of `lpv-mpc`."""
 
     lag_s: Positive
-    """Rotor lag up to which nothing is slowed down."""
+    """Rotor lag above which poles and observers are slower, s."""
     poles: tuple[Negative, Negative]
     acceleration: Positive
     max_g: Positive
     braking_m: Positive
-    """Within which an approach can stop."""
+    """Stopping distance of an approach."""
     wind: Positive
-    """Largest disturbance, in parts of gravity."""
+    """Largest disturbing acceleration, in parts of gravity."""
     acceleration_rad_s: Positive
     moment_rad_s: Positive
     lost_lift: Positive
-    """Largest disturbing moment, in parts of the lift that a rotor may lose."""
+    """Largest disturbing moment, in parts of the moment of one rotor's thrust in hover."""
     turn_rad: tuple[Positive, Positive, Positive]
-    """Within which a turn about each axis can stop."""
+    """Stopping angle of a turn about each axis."""
     max_rate_rad_s: tuple[Positive, Positive, Positive]
     position: Positive
     rate: Positive

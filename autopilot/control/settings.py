@@ -19,7 +19,7 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     solver: str
     tolerance: Positive
     max_iterations: Annotated[int, msgspec.Meta(ge=1, le=100_000)] = 100_000
-    """More count as a time-out."""
+    """Beyond it, the status is time-out."""
 
     def build(self) -> QpSolver:
         return QpSolver(self.solver, self.tolerance, self.max_iterations)

@@ -95,17 +95,17 @@ class Rotors(Table, frozen=True, kw_only=True):
     """J: moment of inertia of one rotor with its motor about its axis."""
     max_speed: Positive
     position_m: _EachRotor[Point]
-    """x forward, y left of each rotor, and z up, which may be left out."""
+    """Position of each rotor: x forward, y left, and optionally z up."""
     direction: _EachRotor[Direction]
-    """Seen from above, against the thrust."""
+    """Direction of rotation of each rotor, seen from above, against the thrust."""
     gyroscopic_term: Literal["conserving", "as-printed"]
-    """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
+    """`conserving` conserves angular momentum; `as-printed` has the thesis's sign and speed unit."""
     idle_speed: NotNegative = 0.0
-    """Least speed of an armed rotor."""
+    """Minimum speed of an armed rotor."""
     axis: tuple[Vector, ...] = ()
-    """Direction of each rotor's thrust, FLU, of any length; without it, all thrust upwards."""
+    """Direction of each rotor's thrust, FLU, of any length. Without it, all rotors thrust upwards."""
     strength: tuple[Part, ...] = ()
-    """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak. Without it, all are 1."""
+    """Factor on thrust and torque of each rotor: 0.85 is a rotor 15 % weak. Without it, all are 1."""
     control: Literal["speed", "thrust"] = "speed"
     """Quantity that a control of 0 to 1 scales, in interfaces of other simulators and autopilots."""
     lag: RotorLag | None = None
@@ -170,29 +170,29 @@ class Drag(Table, frozen=True, kw_only=True):
     """Forces against the motion through the air."""
 
     linear_n_s_m: tuple[NotNegative, NotNegative, NotNegative]
-    """Of the airframe, along the FLU axes: N for each m/s."""
+    """Linear drag of the airframe along the FLU axes, N per m/s."""
     rotor_coefficient: NotNegative
-    """Of one rotor, in its plane: N for each m/s and for each of its speed unit."""
+    """Drag of one rotor in its plane, N per m/s and per speed unit."""
     quadratic_n_s2_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
-    """Of the airframe, along the FLU axes: N for each m/s of the axis and each m/s of airspeed. Of the plant alone:
-    control laws assume the linear part, and estimate the rest as a disturbance."""
+    """Quadratic drag of the airframe along the FLU axes: N per m/s along the axis and per m/s of airspeed. Only the
+    plant models it; control laws estimate it as a disturbance."""
 
 
 class Ground(Table, frozen=True, kw_only=True):
-    """How the vehicle stands on the ground: on its feet, or on its rotors when it has fallen on its back.
+    """Ground contact, of the feet, or of the rotors if the vehicle is upside down.
 
     Values apply per foot. Height 0 is the centre of mass of the vehicle at rest on its feet.
     """
 
     foot_position_m: _EachRotor[PointInPlane]
-    """x forward, y left of each foot, 3 to 8."""
+    """Position of each foot, 3 to 8: x forward, y left."""
     foot_depth_m: Positive
-    """How far the feet are below the centre of mass."""
+    """Distance of the feet below the centre of mass."""
     stiffness_n_m: Positive
     damping_n_s_m: NotNegative
     friction_coefficient: NotNegative
     slip_damping_n_s_m: NotNegative
-    """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
+    """Friction of one foot below Coulomb's limit, N per m/s."""
 
 
 class Battery(Table, frozen=True, kw_only=True):
@@ -206,7 +206,7 @@ class Battery(Table, frozen=True, kw_only=True):
     resistance_ohm: NotNegative
     capacity_ah: Positive
     efficiency: Efficiency
-    """Mechanical power of the rotors over electrical power."""
+    """Mechanical power of the rotors / electrical power."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -215,7 +215,7 @@ class Battery(Table, frozen=True, kw_only=True):
 
 
 class Vehicle(Table, frozen=True, kw_only=True):
-    """A multirotor in SI units, but for rotor speeds (`rotors.speed_unit`). Parts that are `None` are not modelled."""
+    """A multirotor, in SI units except for rotor speeds. Parts that are `None` are not modelled."""
 
     name: str
     gravity_m_s2: Positive

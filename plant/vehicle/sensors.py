@@ -42,7 +42,7 @@ class Magnetometer(SensorPart, frozen=True, kw_only=True):
     rate_hz: Positive
     noise_gauss: NotNegative
     hard_iron_gauss: NotNegative
-    """Standard deviation, along each axis, of the field of the vehicle itself that calibration has left."""
+    """Standard deviation, along each axis, of the vehicle's magnetic field after calibration."""
 
 
 class Barometer(SensorPart, frozen=True, kw_only=True):
@@ -56,13 +56,13 @@ class Barometer(SensorPart, frozen=True, kw_only=True):
 
 
 class Gps(SensorPart, frozen=True, kw_only=True):
-    """Measures position, with noise and drift, and velocity, with noise, some time ago."""
+    """Measures position, with noise and drift, and velocity, with noise, both delayed."""
 
     rate_hz: Positive
     delay_s: NotNegative
     """Time from measurement to transmission, s."""
     fix_type: Annotated[int, msgspec.Meta(ge=3, le=6)]
-    """Of GPS_FIX_TYPE: 3 on its own, 6 with carrier phase fixed (RTK)."""
+    """Value of GPS_FIX_TYPE: 3 for a 3D fix, 6 for RTK fixed."""
     horizontal_noise_m: NotNegative
     vertical_noise_m: NotNegative
     horizontal_drift_m: NotNegative
@@ -79,13 +79,13 @@ class Rangefinder(SensorPart, frozen=True, kw_only=True):
     min_m: NotNegative
     max_m: Positive
     noise_m: NotNegative
-    """Of a sample near by."""
+    """Standard deviation at short distance."""
     noise_part: NotNegative
-    """Of the distance: adds to that in square."""
+    """Standard deviation in parts of the distance; the variances are added."""
     field_of_view_rad: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
     """Angle of the beam's cone; the nearest surface in it is measured."""
     height_m: Positive
-    """Of the sensor above the ground while the vehicle stands on its feet."""
+    """Height of the sensor above the ground while the vehicle stands on its feet."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,7 +94,7 @@ class Rangefinder(SensorPart, frozen=True, kw_only=True):
 
 
 class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All sensors of a vehicle; it may lack a rangefinder."""
+    """The sensors; the rangefinder is optional."""
 
     accelerometer: Accelerometer
     gyroscope: Gyroscope

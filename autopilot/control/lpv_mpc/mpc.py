@@ -31,11 +31,11 @@ class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     position: Positive
     velocity: Positive
     tilt: Positive
-    """Of a demanded attitude: where a place is demanded, the tilt follows from it."""
+    """Weight on tilt, used only for demanded attitudes."""
     heading: Positive
     rate: Positive
     thrust: Positive
-    """Of a demanded thrust."""
+    """Weight on thrust, used only for demanded attitudes."""
     first_correction: Positive
     next_correction: Positive
     terminal_thrust: Positive
@@ -46,9 +46,9 @@ class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The MPC."""
 
     blocks: Annotated[tuple[Count, ...], msgspec.Meta(min_length=1)]
-    """Steps that each correction is held for; the horizon is their sum."""
+    """Number of steps of each constant correction; the horizon is their sum."""
     count_every: Count
-    """Steps between two counted errors."""
+    """Steps between two errors in the cost."""
     max_tilt_deg: Degrees
     max_rate_rad_s: tuple[Positive, Positive, Positive]
     check_every: Count

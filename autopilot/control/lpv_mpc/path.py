@@ -23,7 +23,7 @@ from colibri.common.types import Array
 
 
 class PathSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The speed along the path, in parts of the references' own."""
+    """The speed along the path, relative to that of the references."""
 
     min_speed: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
     """1 follows the clock."""

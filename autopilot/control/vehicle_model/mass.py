@@ -26,7 +26,7 @@ class MassSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     rate_1_s: NotNegative
     """0: the nominal mass is kept."""
     min_ratio: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
-    """Of the mass to the nominal one, and so the largest."""
+    """Smallest mass estimate / nominal mass; `max_ratio`: the largest."""
     max_ratio: Annotated[float, msgspec.Meta(ge=1.0)]
 
 

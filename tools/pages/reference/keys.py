@@ -116,10 +116,11 @@ def _what(kind: kinds.Type) -> str:
         case kinds.LiteralType():
             return " or ".join(f"`{value}`" for value in kind.values)
         case kinds.TupleType():
-            each = {_what(item): None for item in kind.item_types}
-            return f"{len(kind.item_types)} of: {', '.join(each)}"
+            each = ", ".join({_what(item): None for item in kind.item_types})
+            return re.sub(r"number\b", "numbers", f"{len(kind.item_types)} {each}")
         case kinds.VarTupleType():
-            return f"list of: {_what(kind.item_type)}"
+            each = re.sub(r"^(?=\d)", "groups of ", _what(kind.item_type))
+            return "list of " + re.sub(r"(list|number)\b", r"\1s", each)
         case kinds.UnionType():
             return " or ".join(_what(part) for part in kind.types if not isinstance(part, kinds.NoneType))
         case kinds.DictType():
