@@ -5,7 +5,7 @@ import signal
 
 from hypothesis import settings
 
-from colibri.common.process.lifecycle import use_one_thread
+from colibri.common.process.lifecycle import freeze_once, use_one_thread
 
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
@@ -19,5 +19,5 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
     gc.collect()
-    gc.freeze()
+    freeze_once()
     gc.set_threshold(20_000, 20, 20)

@@ -71,29 +71,29 @@ def test_a_restart_is_not_felt_in_hover_and_in_a_turn(
 ) -> None:
     """Frames are missed while an autopilot starts only where the plant does not wait for it."""
     (sitl,) = sitl_fleet(1, feedback=feedback)
-    sitl.takeoff(4.0)
-    sitl.run(1.0)
+    sitl.takeoff(3.0)
+    sitl.run(0.5)
     height_m = sitl.position[2]
     sitl.inside.skip(missed)
     restart(sitl)
     assert max_tilt_deg(sitl, 2.0) < (3.0 if missed == 1 else 20.0)
     assert sitl.position[2] == pytest.approx(height_m, abs=0.15)
-    fly_mission(sitl, items.waypoint(15.0, 0.0, 4.0), items.waypoint(0.0, 6.0, 4.0, stay_s=1.0))
+    fly_mission(sitl, items.waypoint(12.0, 0.0, 3.0), items.waypoint(4.0, 5.0, 3.0, stay_s=1.0))
     sitl.wait_until(lambda: reached(sitl) == [0], within=10.0)
     sitl.inside.skip(missed)
     restart(sitl)
     assert max_tilt_deg(sitl, 4.0) < 45.0
     sitl.wait_until(lambda: state(sitl) == HOLDING, within=15.0)
-    assert sitl.is_at((0.0, 6.0, 4.0), 0.3 if feedback == "state" else 3.0, slow_m_s=1.0)
+    assert sitl.is_at((4.0, 5.0, 3.0), 0.3 if feedback == "state" else 3.0, slow_m_s=1.0)
 
 
 @pytest.mark.parametrize("flying_s", [4.0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.0, 0.6))])
 @pytest.mark.feedback("sensors")
 def test_without_memory_a_vehicle_on_sensors_is_caught(sitl: Sitl, flying_s: float) -> None:
     """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
-    sitl.takeoff(8.0)
+    sitl.takeoff(5.0)
     if flying_s:
-        sitl.goto(60.0, 20.0, 8.0, wait=False)
+        sitl.goto(60.0, 20.0, 5.0, wait=False)
         sitl.run(flying_s)
     height_m, since_s = sitl.position[2], sitl.time_s
     restart(sitl, lambda _: None)
@@ -108,15 +108,15 @@ def test_without_memory_a_vehicle_on_sensors_is_caught(sitl: Sitl, flying_s: flo
 
 @pytest.mark.feedback("sensors")
 def test_a_caught_vehicle_goes_on_with_its_mission(sitl: Sitl) -> None:
-    sitl.takeoff(12.0)
-    fly_mission(sitl, items.waypoint(5.0, 0.0, 12.0, stay_s=2.0), items.waypoint(0.0, 5.0, 12.0))
+    sitl.takeoff(7.0)
+    fly_mission(sitl, items.waypoint(5.0, 0.0, 7.0, stay_s=2.0), items.waypoint(0.0, 5.0, 7.0))
     sitl.wait_until(lambda: reached(sitl) == [0], within=10.0)
     restart(sitl, lambda kept: kept._replace(checkpoint=kept.checkpoint._replace(state_source=b"")))
     sitl.run(0.5)
     sitl.wait_until(lambda: state(sitl) == HOLDING, within=20.0)
     assert sitl.said("Restarted in flight: mission continues at item 0")
     assert sitl.said("Restarted in flight without a record: falling")
-    assert sitl.is_at((0.0, 5.0, 12.0), 3.0, slow_m_s=1.0)
+    assert sitl.is_at((0.0, 5.0, 7.0), 3.0, slow_m_s=1.0)
 
 
 @pytest.mark.sitl(airborne=3.0, profile="flight")
@@ -202,7 +202,7 @@ def test_another_law_takes_over_what_was_commanded(sitl: Sitl) -> None:
     sitl.goto(5.0, 0.0, 3.0, wait=False)
     sitl.run(1.0)
     restart(sitl, lambda kept: kept._replace(checkpoint=kept.checkpoint._replace(fingerprint=0)))
-    sitl.run(5.0)
+    sitl.run(4.0)
     assert hypot(sitl.position[0] - 5.0, sitl.position[1]) < 0.05
 
 

@@ -11,11 +11,11 @@ from colibri.sitl.flight_record import tilt_deg
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import QUICK, refused, restart
 
-pytestmark = QUICK
+pytestmark = [QUICK, pytest.mark.sitl(params={"COM_DISARM_LAND": 0.1})]
 
 NEXT_TO_NONE = 0.001
 """Part of the thrust that is left of a rotor without its blades: it is gone at once, which is the worst that can be."""
-HIGH = pytest.mark.sitl(airborne=10.0)
+HIGH = pytest.mark.sitl(airborne=6.0)
 
 
 def fall(sitl: Sitl, rotor: int, *, peak_deg: float = 35.0, settled_deg: float = 20.0, away_m: float = 2.0) -> None:
@@ -47,7 +47,7 @@ def test_it_lands_upright_on_three_rotors(sitl: Sitl, rotor: int) -> None:
 
 @pytest.mark.sitl(feedback="sensors", seed=3)
 def test_it_lands_on_sensors(sitl: Sitl) -> None:
-    sitl.takeoff(10.0)
+    sitl.takeoff(6.0)
     fall(sitl, 3)
 
 
@@ -58,7 +58,7 @@ def test_any_control_law_may_have_flown_before(sitl: Sitl) -> None:
     fall(sitl, 2)
 
 
-@pytest.mark.sitl(airborne=4.0)
+@pytest.mark.sitl(airborne=3.0)
 def test_with_a_lost_rotor_only_landing_is_possible(sitl: Sitl) -> None:
     sitl.run(0.4)
     sitl.inject("motor", "off", 2)
@@ -79,7 +79,7 @@ def keep_flying(sitl: Sitl, rotor: int, remaining: str) -> None:
     sitl.run(1.0)
     place, began_s = sitl.position, sitl.time_s
     sitl.inject("motor", "wrong", rotor + 1, NEXT_TO_NONE)
-    sitl.run(6.0)
+    sitl.run(4.0)
     assert sitl.inside.copter.parts.rotor_loss.lost == rotor
     assert sitl.said(f"rotor {rotor + 1} failed: flying on {remaining}")
     flown = sitl.flown(began_s)
@@ -94,7 +94,7 @@ def keep_flying(sitl: Sitl, rotor: int, remaining: str) -> None:
 
 
 @pytest.mark.parametrize("rotor", [0, *(pytest.param(rotor, marks=pytest.mark.long) for rotor in range(1, 6))])
-@pytest.mark.sitl(vehicle="firefly", airborne=4.0)
+@pytest.mark.sitl(vehicle="firefly", airborne=2.0)
 def test_a_hexarotor_flies_on_with_five(sitl: Sitl, rotor: int) -> None:
     keep_flying(sitl, rotor, "5 rotors, yaw given up")
 
@@ -131,14 +131,14 @@ def test_a_hexarotor_may_have_to_land(sitl: Sitl) -> None:
 
 @HIGH
 def test_a_rotor_lost_at_speed_is_survived(sitl: Sitl) -> None:
-    sitl.goto(100.0, 0.0, 10.0, speed=5.0, wait=False)
+    sitl.goto(100.0, 0.0, 6.0, speed=5.0, wait=False)
     sitl.run(4.0)
     assert hypot(*sitl.velocity) > 4.5
     fall(sitl, 0, peak_deg=90.0, settled_deg=25.0, away_m=50.0)
 
 
 @pytest.mark.parametrize("memory", [True, False])
-@pytest.mark.sitl(airborne=6.0)
+@pytest.mark.sitl(airborne=5.0)
 def test_a_restarted_autopilot_lands_on_three_rotors(sitl: Sitl, memory: bool) -> None:
     sitl.run(0.4)
     sitl.inject("motor", "off", 4)

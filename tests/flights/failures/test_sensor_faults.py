@@ -18,7 +18,7 @@ from tests.support.failed_sensors import Fault, flown_on, matrix, singles
 from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
 from tools.random_flights import case_of, fly
 
-pytestmark = QUICK
+pytestmark = [QUICK, pytest.mark.sitl(params={"COM_DISARM_LAND": 0.1})]
 
 ON_SENSORS = pytest.mark.sitl(feedback="sensors", seed=3)
 OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
@@ -27,7 +27,7 @@ OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
 @ON_SENSORS
 @pytest.mark.sitl(params={"COM_POS_FS_EPH": 0.6})
 def test_without_a_position_it_lands_and_does_not_hold(sitl: Sitl) -> None:
-    sitl.takeoff(4.0)
+    sitl.takeoff(2.0)
     sitl.inject("gps", "off")
     sitl.wait_until(lambda: sitl.said("Failsafe activated: position lost, descend"), within=30.0)
     assert sitl.mode is Mode.LAND
@@ -39,9 +39,9 @@ def test_without_a_position_it_lands_and_does_not_hold(sitl: Sitl) -> None:
 
 @ON_SENSORS
 def test_gps_that_reports_zero_is_not_followed(sitl: Sitl, monkeypatch: pytest.MonkeyPatch) -> None:
-    sitl.takeoff(5.0)
-    sitl.goto(8.0, 0.0, 5.0, wait=False)
-    sitl.run(6.0)
+    sitl.takeoff(2.0)
+    sitl.goto(8.0, 0.0, 2.0, wait=False)
+    sitl.run(5.0)
     autopilot = sitl.inside.autopilot
     step: Callable[..., Step] = autopilot.step
 
@@ -50,9 +50,9 @@ def test_gps_that_reports_zero_is_not_followed(sitl: Sitl, monkeypatch: pytest.M
         return step(frame._replace(gps=gps), plant_status)
 
     monkeypatch.setattr(autopilot, "step", nowhere)
-    sitl.hold(lambda: hypot(*sitl.position[:2]) > 5.0, for_=10.0)
+    sitl.hold(lambda: hypot(*sitl.position[:2]) > 5.0, for_=5.0)
     assert sitl.said("Warning: GPS lost, position by dead reckoning")
-    assert dist(sitl.position, (8.0, 0.0, 5.0)) < 2.0
+    assert dist(sitl.position, (8.0, 0.0, 2.0)) < 2.0
 
 
 @pytest.mark.sitl(feedback="sensors", ready=False)
@@ -69,8 +69,7 @@ def test_before_the_first_estimate_commands_are_denied(sitl: Sitl) -> None:
 @pytest.mark.sitl(feedback="sensors", seed=1)
 def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
     bias = (0.0, 0.0, 2.0)
-    sitl.takeoff(10.0)
-    sitl.run(2.0)
+    sitl.takeoff(5.0)
     source = sitl.inside.copter.parts.state_source
     assert not sitl.said(OFF)
     for kind, numbers, resets in (("wrong", bias, 1), ("ok", (), 2)):
@@ -133,14 +132,14 @@ def test_slow_drifts_and_winds_end_in_landings(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "drift"), [("mag", (0.02, 0.0, 0.0)), ("gyro", (0.002, 0.0, 0.0))], ids=["magnetometer", "gyroscope"]
+    ("unit", "drift"), [("mag", (0.03, 0.0, 0.0)), ("gyro", (0.003, 0.0, 0.0))], ids=["magnetometer", "gyroscope"]
 )
 @pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="7@200", strict=False)
 def test_a_sensor_that_drifts_slowly_turns_nothing(sitl: Sitl, unit: str, drift: Vector) -> None:
-    sitl.takeoff(8.0)
+    sitl.takeoff(3.0)
     sitl.inject(unit, "slow", 0, *drift)
-    for place in range(6):
-        sitl.goto(12.0 if place % 2 else -12.0, 6.0 * (place % 3), 8.0, wait=False)
+    for place in range(4):
+        sitl.goto(12.0 if place % 2 else -12.0, 6.0 * (place % 3), 3.0, wait=False)
         sitl.run(4.0)
     sitl.select(Mode.LAND)
     sitl.wait_until(lambda: not sitl.armed, within=30.0)

@@ -70,7 +70,7 @@ def test_an_orbit_commanded_again_goes_on_where_it_is(sitl: Sitl) -> None:
         return hypot(sitl.position[0] - 5.0, sitl.position[1])
 
     turn(4.0, 2.0)
-    sitl.run(5.0)
+    sitl.run(3.5)
     turn(4.0, 3.0)
     sitl.hold(lambda: sitl.speed_m_s > 1.9, for_=2.0)
     assert sitl.speed_m_s == pytest.approx(3.0, abs=0.1)
@@ -81,7 +81,7 @@ def test_an_orbit_commanded_again_goes_on_where_it_is(sitl: Sitl) -> None:
     sitl.run(4.0)
     assert away_m() == pytest.approx(2.0, abs=0.15)
     sitl.select(Mode.HOLD)
-    sitl.run(3.0)
+    sitl.run(2.5)
     assert sitl.speed_m_s < 0.1
 
 

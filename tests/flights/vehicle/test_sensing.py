@@ -15,7 +15,7 @@ from colibri.sitl.vehicle import Sitl
 from tests.support.flying import QUICK, latest, restart
 from tools.chaos import Thrower
 
-pytestmark = QUICK
+pytestmark = [QUICK, pytest.mark.sitl(params={"COM_DISARM_LAND": 0.1})]
 
 LATENCY_MS = 20.0
 TOO_FAST = "lemniscate:lap=3,height=20"
@@ -31,8 +31,8 @@ def off_m(sitl: Sitl) -> float:
 @pytest.mark.seed(1)
 @pytest.mark.feedback("sensors")
 def test_a_flight_on_sensors_from_arming_to_landing(sitl: Sitl) -> None:
-    sitl.takeoff(5.0)
-    sitl.goto(10.0, 5.0, 8.0, wait=False)
+    sitl.takeoff(2.0)
+    sitl.goto(6.0, 3.0, 3.0, wait=False)
     sitl.run(2.0)
     imu, gps, status = (latest(sitl, name) for name in ("HIGHRES_IMU", "GPS_RAW_INT", "ESTIMATOR_STATUS"))
     assert imu.zacc == pytest.approx(-9.81, abs=1.5)
@@ -43,8 +43,8 @@ def test_a_flight_on_sensors_from_arming_to_landing(sitl: Sitl) -> None:
     assert status.flags & mav.ESTIMATOR_POS_HORIZ_ABS
     assert 0.0 < status.pos_horiz_accuracy < 1.0
     assert 0.0 < status.vel_ratio < 1.0
-    sitl.run(10.0)
-    assert sitl.position == pytest.approx((10.0, 5.0, 8.0), abs=1.0)
+    sitl.run(5.0)
+    assert sitl.position == pytest.approx((6.0, 3.0, 3.0), abs=1.0)
     assert off_m(sitl) < 1.0
     sitl.land()
     assert abs(sitl.position[2]) < 0.01
@@ -69,7 +69,7 @@ def test_a_rangefinder_keeps_the_height_through_its_faults(sitl_fleet: Callable[
     source = sitl.inside.copter.parts.state_source
     for kind, value in (("off", 0.0), ("stuck", 0.0), ("wrong", 1.0)):
         sitl.inject("distance_sensor", kind, 0, value)
-        sitl.run(2.5)
+        sitl.run(2.0)
         assert source.estimate is not None
         assert source.estimate.health.not_accepted == ("rangefinder",)
         assert sitl.position[2] == pytest.approx(2.0, abs=0.2)
@@ -106,13 +106,13 @@ def test_without_compensation_the_delay_is_too_much(sitl: Sitl) -> None:
 @pytest.mark.parametrize("feedback", ["state", "sensors"])
 def test_with_a_delay_it_takes_off_and_lands(sitl_fleet: Callable[..., list[Sitl]], feedback: str) -> None:
     (sitl,) = sitl_fleet(1, feedback=feedback, latency=LATENCY_MS, seed=3)
-    sitl.takeoff(2.0)
+    sitl.takeoff(1.0)
     sitl.hold(lambda: max(map(abs, sitl.euler[:2])) < 0.1, for_=1.0)
     sitl.land()
     assert abs(sitl.position[2]) < 0.01
 
 
-@pytest.mark.sitl(airborne=8.0, latency=0.5 * LATENCY_MS)
+@pytest.mark.sitl(airborne=4.0, latency=0.5 * LATENCY_MS)
 def test_with_a_delay_a_lost_rotor_is_flown_down(sitl: Sitl) -> None:
     sitl.run(1.0)
     sitl.inject("motor", "off", 1)
@@ -126,7 +126,7 @@ def test_a_compensation_that_raises_is_left_out(sitl: Sitl) -> None:
     thrower = Thrower("autopilot.control.delay:DelayCompensation.ahead")
     thrower.arm()
     try:
-        sitl.run(2.0)
+        sitl.run(1.0)
     finally:
         thrower.disarm()
     assert dist(sitl.position, (0.0, 0.0, 5.0)) < 0.05

@@ -227,16 +227,16 @@ def target(sitl: Sitl, place: Vector, velocity: Vector = STILL) -> None:
     [(0, 3.0, 8.0), (ABOVE_TARGET, 3.0, 11.0), (ABOVE_TARGET, -8.0, MIN_HEIGHT_M)],
     ids=["above home", "above the target", "never into the ground"],
 )
-@pytest.mark.sitl(params={"FLW_TGT_DST": 2.0, "FLW_TGT_HT": 8.0})
+@pytest.mark.sitl(airborne=8.0, params={"FLW_TGT_DST": 2.0, "FLW_TGT_HT": 8.0})
 def test_the_target_is_followed_at_its_distance(sitl: Sitl, above: int, target_up_m: float, height_m: float) -> None:
     sitl.set_param("FLW_TGT_ALT_M", above)
     sitl.select(Mode.FOLLOW)
-    for _ in range(9):
-        target(sitl, (10.0, 0.0, target_up_m))
+    for _ in range(6):
+        target(sitl, (5.0, 0.0, target_up_m))
         sitl.run(1.0)
     assert sitl.mode is Mode.FOLLOW
     east, north, up = sitl.position
-    assert hypot(east - 10.0, north) == pytest.approx(2.0, abs=0.1)
+    assert hypot(east - 5.0, north) == pytest.approx(2.0, abs=0.1)
     assert up == pytest.approx(height_m, abs=0.1)
 
 
