@@ -2,6 +2,7 @@
 
 import ast
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ LINES = 40
 SLOW = {"learn_hover", "mavsdk_takeoff", "test_return"}
 LEARNS = "learn_hover"
 """Run for two generations only."""
+STARTS_PROCESSES = "campaign_and_plot"
 SPEED = 3.0
 """Of vehicles for clients, times real time."""
 
@@ -45,7 +47,9 @@ def test_example_is_short(path: Path) -> None:
     [pytest.param(path, marks=[pytest.mark.long] * (path.stem in SLOW)) for path in EXAMPLES],
     ids=lambda path: path.stem,
 )
-def test_example_prints_what_it_says(path: Path, tmp_path: Path) -> None:
+def test_example_prints_what_it_says(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     if path.stem == LEARNS:
         assert printed(tmp_path, str(path), "2").startswith("lost: ")
     elif path.stem.startswith("test_"):
@@ -55,5 +59,9 @@ def test_example_prints_what_it_says(path: Path, tmp_path: Path) -> None:
         with vehicle(tmp_path, speed=SPEED) as flown:
             url = flown.mavsdk_url if path.stem.startswith("mavsdk") else f"udpout:127.0.0.1:{flown.port}"
             assert printed(tmp_path, str(path), url) == promised(path)
-    else:
+    elif path.stem == STARTS_PROCESSES:
         assert printed(tmp_path, str(path)) == promised(path)
+    else:
+        monkeypatch.chdir(tmp_path)
+        runpy.run_path(str(path), run_name="__main__")
+        assert capfd.readouterr().out.strip() == promised(path)

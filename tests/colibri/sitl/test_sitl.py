@@ -54,6 +54,11 @@ def options() -> list[str]:
     return [] if any(entry.value == MODULE for entry in known) else ["-p", MODULE]
 
 
+@pytest.fixture
+def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.sitl.session.draw", lambda _flown, _texts, path, **_: path.touch())
+
+
 def run(pytester: pytest.Pytester, text: str, *more: str) -> pytest.RunResult:
     pytester.makepyfile(text)
     return pytester.runpytest_inprocess(*options(), "-p", "no:cacheprovider", *more)
@@ -137,6 +142,7 @@ def test_a_failed_test_keeps_its_flight_for_replay(pytester: pytest.Pytester) ->
     assert properties == {"sitl_simulated_s": f"{facts['simulated_s']:g}", "sitl_kept": f"sitl-failures/{folder.name}"}
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_only_flights_of_tests_that_fail_now_are_kept(pytester: pytest.Pytester) -> None:
     source = """
         import pytest
@@ -212,6 +218,7 @@ def test_a_mark_without_its_fixture_is_refused(pytester: pytest.Pytester, mark: 
     run(pytester, text).assert_outcomes(passed=1)
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_failed_tests_of_similar_names_keep_their_flights(pytester: pytest.Pytester) -> None:
     source = """
         import pytest
@@ -228,8 +235,10 @@ def test_failed_tests_of_similar_names_keep_their_flights(pytester: pytest.Pytes
     assert len(tests) == len(folders) == 5
 
 
-@pytest.mark.parametrize("logging", ["no", "all"])
-def test_junit_has_folder_replay_and_picture_in_one_text(pytester: pytest.Pytester, logging: str) -> None:
+@pytest.mark.parametrize(("logging", "workers"), [("no", ("-n", "1")), ("all", ())])
+def test_junit_has_folder_replay_and_picture_in_one_text(
+    pytester: pytest.Pytester, logging: str, workers: tuple[str, ...]
+) -> None:
     source = """
         import pytest
 
@@ -238,7 +247,7 @@ def test_junit_has_folder_replay_and_picture_in_one_text(pytester: pytest.Pytest
             print("mine")
             sitl.hold(lambda: sitl.position[2] > 4.0, for_=0.3)
         """
-    result = run(pytester, source, "--junitxml=junit.xml", "-o", f"junit_logging={logging}", "-n", "1")
+    result = run(pytester, source, "--junitxml=junit.xml", "-o", f"junit_logging={logging}", *workers)
     result.assert_outcomes(failed=1)
     (case,) = ElementTree.parse(pytester.path / "junit.xml").iter("testcase")
     (out,) = case.findall("system-out")
