@@ -115,8 +115,11 @@ def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
     }
 
 
-def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, ran: Ran) -> None:
+def test_a_profile_given_by_path_flies_under_its_name(
+    tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """By options of `colibri fly` that change neither the table nor its columns; again only what has changed."""
+    monkeypatch.setattr(Pool, "each", Here().each)
     copy, out = written(tmp_path / "p", "t2.toml"), tmp_path / "out"
     options = ["--track", "hover", "--duration", "0.5", "--wind", "2@270", "--without", "drag", "--start", "z=3"]
     command = ["compare", "--profile", copy, *options, "--out", str(out)]

@@ -14,7 +14,6 @@ from colibri.analysis.figures import (
     Curve,
     Panel,
     TimeFigure,
-    draw_flight,
     draw_times,
     draw_trajectory,
     flight_figures,
@@ -29,7 +28,6 @@ from colibri.plant.vehicle.description import load_vehicle
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SVG = b"<?xml"
-NAMES = ["trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png"]
 DEGREES = 180.0 / np.pi
 
 
@@ -81,15 +79,6 @@ def line(axes: Axes, label: str) -> Line2D:
 
 def drawn(line: Line2D) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
-
-
-def test_six_png_files_wide_enough_to_read(short: Flight) -> None:
-    paths = draw_flight(short.flown, short.plan)
-    assert paths == [short.plan.out / name for name in NAMES]
-    for path in paths:
-        content = path.read_bytes()
-        assert content.startswith(PNG)
-        assert int.from_bytes(content[16:20], "big") >= 900
 
 
 FOLLOWED = [

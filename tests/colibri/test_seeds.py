@@ -25,8 +25,11 @@ assert _SENSORS is not None
 MEASURED_HERE = kinds_of(_SENSORS)
 
 
-def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, ran: Ran) -> None:
-    options = ["--profile", "flight", "--feedback", "sensors", "--seeds", "1-2", "--track", "hover", "--duration", "22"]
+def test_flights_by_seeds_become_a_table_and_a_figure(
+    tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Pool, "each", Here().each)
+    options = ["--profile", "flight", "--feedback", "sensors", "--seeds", "1-2", "--track", "hover", "--duration", "21"]
     assert "hover" in ran("compare", *options, "--out", tmp_path).out
     with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
         flights = list(csv.DictReader(file))
@@ -74,8 +77,9 @@ def test_what_is_there_is_not_flown_again(
     assert re.fullmatch(line, refused(*options, "--wind", "5@270"))
 
 
-def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
+def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The thesis's profile tips over on what is flown so briskly."""
+    monkeypatch.setattr(Pool, "each", Here().each)
     options = ["--seeds", "1", "--profile", "thesis", "--track", "lemniscate", "--duration", "30", "--quiet"]
     assert main(["compare", *options, "--out", str(tmp_path)]) == 1
     with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:

@@ -74,7 +74,7 @@ def test_every_part_of_it_is_confirmed(part: str) -> None:
     assert min(certificates.margins_of(FLIGHT, part, numbers, proof).values()) > 0.0
 
 
-@pytest.mark.parametrize("flights", [100, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
 def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
     flown = fly(FLIGHT, CERTIFIED.invariant, flights, 1.0, seed=1)
     assert flown.values.shape[1] == flights

@@ -160,7 +160,11 @@ def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, ran: Ran, refus
     (out / "report.json").unlink()
     drawn = ran("plot", out).out.split()
     assert drawn == [str(out / f"{name}.png") for name in FIGURES]
-    assert all(Path(path).stat().st_size > 10_000 for path in drawn)
+    for path in drawn:
+        content = Path(path).read_bytes()
+        assert content.startswith(b"\x89PNG\r\n\x1a\n")
+        assert len(content) > 10_000
+        assert int.from_bytes(content[16:20], "big") >= 900  # wide enough to read
     assert "provenance.json is missing" in refused("plot", tmp_path)
 
 

@@ -12,6 +12,7 @@ import psutil
 import pytest
 
 from tests.colibri.cli.test_processes import flying
+from tests.support.commands import exit_code
 from tools.harness.ports import bound_socket
 from tools.harness.processes import THESIS_PLANT, wait_for
 
@@ -22,11 +23,11 @@ KEPT = "; logs are in {}"
 @pytest.mark.parametrize(
     ("whom", "number", "code", "line"),
     [
-        ("colibri", signal.SIGINT, 130, "interrupted"),
+        pytest.param("colibri", signal.SIGINT, 130, "interrupted", marks=pytest.mark.long),
         ("colibri", signal.SIGTERM, 143, "ended by SIGTERM"),
         ("colibri", signal.SIGHUP, 129, "ended by SIGHUP"),
         ("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM"),
-        ("autopilot", signal.SIGHUP, 1, "the autopilot was ended by SIGHUP"),
+        pytest.param("autopilot", signal.SIGHUP, 1, "the autopilot was ended by SIGHUP", marks=pytest.mark.long),
     ],
 )
 def test_a_signal_ends_the_flight_with_a_line(
@@ -84,18 +85,21 @@ def test_an_unread_pipe_does_not_hold_up_a_flight(tmp_path: Path) -> None:
     os.close(write)
 
 
-def test_a_fifo_in_a_files_place_is_bad_input(tmp_path: Path) -> None:
+def test_a_fifo_in_a_files_place_is_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     fifo, profile = tmp_path / "fifo", tmp_path / "fifo.toml"
     os.mkfifo(fifo)
     os.mkfifo(profile)
     calls = ("--gcs", "udpout:127.0.0.1:9")
+    reason = "is a FIFO, device or socket: a regular file is required\n"
+    out = ("--quiet", "--out", str(tmp_path / "out"))
     for options in (
-        ("fly", "hover", *calls, "--signing-key", str(fifo)),
-        ("fly", "hover", "--profile", str(profile)),
-        ("fly", f"waypoints:{fifo}"),
-        ("autopilot", *calls, "--signing-key", str(fifo)),
+        ("fly", "hover", *calls, "--signing-key", str(fifo), *out),
+        ("fly", "hover", "--profile", str(profile), *out),
+        ("fly", f"waypoints:{fifo}", *out),
         ("vehicle", "hummingbird", "--for", "px4", "--out", str(fifo)),
     ):
-        done = subprocess.run([*COLIBRI, *options], capture_output=True, text=True, cwd=tmp_path, check=False)
-        assert done.returncode == 2, options
-        assert done.stderr.endswith("is a FIFO, device or socket: a regular file is required\n")
+        assert exit_code([*options]) == 2, options
+        assert capfd.readouterr().err.endswith(reason), options
+    autopilot = [*COLIBRI, "autopilot", *calls, "--signing-key", str(fifo)]
+    done = subprocess.run(autopilot, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stderr.endswith(reason)) == (2, True)

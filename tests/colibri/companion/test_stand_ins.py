@@ -27,11 +27,11 @@ STACKS: list[Callable[[], StandIn]] = [Px4, ArduPilot]
 @pytest.mark.parametrize("made", STACKS)
 def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
     vehicle = made()
-    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=8.0))
+    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=5.0))
     assert ride.to_the_end(60.0).in_order
     errors = ride.companion.errors
     assert vehicle.mode == vehicle.hold
-    assert errors.flown_s == pytest.approx(8.0, abs=0.1)
+    assert errors.flown_s == pytest.approx(5.0, abs=0.1)
     assert errors.rmse_m() < 0.05
 
 

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from functools import cache
 from typing import Any
 
 import pytest
@@ -39,6 +40,7 @@ BAD: dict[type[laws.Good], tuple[str, set[str]]] = {
 }
 
 
+@cache
 def tried(law: type[laws.Good], area: str) -> Conformance:
     return colibri.check_controller(law, only=[area], duration=SHORT_S)
 

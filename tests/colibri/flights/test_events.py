@@ -143,16 +143,16 @@ def test_events_without_effect_are_named() -> None:
         colibri.fly("hover", duration=0.1, events=["5:payload=0.2"])
 
 
-@pytest.mark.sitl(events=["12:payload=0.05", "20:setpoint=2,0,6", "20.5:mode=offboard", "35:mode=land"])
+@pytest.mark.sitl(events=["5:payload=0.05", "8:setpoint=1,0,2.5", "8.2:mode=offboard", "12:mode=land"])
 def test_the_fixture_flies_events_of_plant_and_station(sitl: colibri.Sitl) -> None:
-    sitl.takeoff(5.0)
-    assert sitl.time_s < 20.0
-    sitl.wait_until(lambda: sitl.mode == "offboard" and sitl.is_at((2.0, 0.0, 6.0)), within=30.0)
-    sitl.wait_until(lambda: sitl.mode == "land", within=20.0)
+    sitl.takeoff(2.0)
+    assert sitl.time_s < 8.0
+    sitl.wait_until(lambda: sitl.mode == "offboard" and sitl.is_at((1.0, 0.0, 2.5)), within=10.0)
+    sitl.wait_until(lambda: sitl.mode == "land", within=10.0)
 
 
 def test_modes_and_setpoints_fly_beside_ground_stations(tmp_path: Path) -> None:
-    words = ["fly", "hover", "--duration", "5", "--link", "udp", "--gcs", "udpin:127.0.0.1:0", "--speed", "max"]
+    words = ["fly", "hover", "--duration", "3.5", "--link", "udp", "--gcs", "udpin:127.0.0.1:0", "--speed", "max"]
     events = ["--event", "0.5:setpoint=1,0,3", "--event", "0.7:mode=offboard", "--event", "0.8:payload=0.05"]
     hashes = set()
     for out in (tmp_path / "one", tmp_path / "two"):
