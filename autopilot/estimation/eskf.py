@@ -271,9 +271,9 @@ class Filter:
 
     def _doubt_motion(self) -> None:
         """Inflate velocity and position by what GPS contradicts."""
-        speed_m_s = hypot(*self.velocity.test.innovation)
-        update.inflate_covariance(self.P, POSITION, 3, square(_UNSURE_S * speed_m_s))
-        update.inflate_covariance(self.P, VELOCITY, 3, speed_m_s * speed_m_s)
+        for axis, error_m_s in enumerate(self.velocity.test.innovation):
+            update.inflate_covariance(self.P, POSITION + axis, 1, square(_UNSURE_S * error_m_s))
+            update.inflate_covariance(self.P, VELOCITY + axis, 1, square(error_m_s))
 
     def check(self, time_us: int) -> FilterCheck:
         upper = self.P.take(_UPPER).tolist()

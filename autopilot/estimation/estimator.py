@@ -276,6 +276,8 @@ class Estimator:
         if reason is not None:
             self._rejected.add(RejectedSource.GPS, reason)
         self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        if modelled.force_modelled:
+            self._output_smoothing.follow()
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
         if found is not None and not (modelled.force_modelled or modelled.rate_modelled):
             self.filter.reset_accel_bias(found, now_us)

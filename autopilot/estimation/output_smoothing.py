@@ -31,6 +31,10 @@ class OutputSmoothing:
         self.position_m = _less(self.position_m, moved)
         self.velocity_m_s = _less(self.velocity_m_s, _beyond((dvx, dvy, dvz), _USUAL_M_S))
 
+    def follow(self) -> None:
+        """Publish the filter's velocity at once."""
+        self.velocity_m_s = _NONE
+
     def give_in(self, interval_s: float) -> None:
         if self.position_m is not _NONE:
             self.position_m = _faded(self.position_m, interval_s)

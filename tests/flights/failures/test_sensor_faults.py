@@ -148,5 +148,12 @@ def test_a_sensor_that_drifts_slowly_turns_nothing(sitl: Sitl, unit: str, drift:
 
 
 @pytest.mark.long
+def test_no_slow_drift_ends_in_an_impact() -> None:
+    drifts = [(unit, drift, axis) for unit, drift in (("mag", 0.01), ("accel", 0.1)) for axis in range(3)]
+    cases = [[Fault(unit, "slow", (0.0,) * axis + (-drift,) + (0.0,) * (2 - axis))] for unit, drift, axis in drifts]
+    assert not [name for name, outcome in matrix(cases, [5.0], ["cruise"], seed=3, vehicle="iris") if outcome.bad]
+
+
+@pytest.mark.long
 def test_no_failed_sensor_ends_in_an_impact() -> None:
     assert not [name for name, outcome in matrix(singles()) if outcome.bad]
