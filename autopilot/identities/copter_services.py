@@ -200,7 +200,7 @@ class Switches(Polled):
         self._position: int | None = None
         self._seen: TelemetrySnapshot | None = None
         self._fenced = False
-        self._high: dict[int, bool] = {}
+        self._levels: dict[int, int] = {}
         self._stick, self._since_us = 0, 0
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
@@ -255,14 +255,15 @@ class Switches(Polled):
             self._served.say(WARNING, refusal.reason)
 
     def _function(self, number: int, value: int) -> None:
+        low, high = _CHANNEL_US
+        if not low < value < high:
+            return
+        level = _HIGH if value > _HIGH_US else _LOW if value < _LOW_US else _MIDDLE
+        before, self._levels[number] = self._levels.get(number), level
         option = int(self._served.parameters[f"RC{number}_OPTION"]) if number <= 16 else 0
-        high = value > _HIGH_US
-        if not option or not (high or value < _LOW_US) or self._high.get(number) is high:
-            return
-        before, self._high[number] = self._high.get(number), high
-        if before is None and (not high or option in _ARM_OPTIONS):
-            return
-        self._act(option, _HIGH if high else _LOW)
+        begins_high = before is None and level == _HIGH and option not in _ARM_OPTIONS
+        if option and (begins_high or before not in (None, level)):
+            self._act(option, level)
 
     def _act(self, option: int, level: int) -> None:
         """Carry out a function: RC_Channel.cpp."""

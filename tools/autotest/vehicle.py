@@ -22,7 +22,7 @@ from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.errors import Error, unknown
 from colibri.common.files import read_text
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import Stop, fail, gc_frozen, one_line
+from colibri.common.process.lifecycle import Stop, gc_frozen, one_line
 from colibri.common.process.status import Status
 from colibri.flights.flight import InMemory
 from colibri.mavlink.hil.feedback import Feedback
@@ -49,11 +49,9 @@ def parser() -> ArgumentParser:
     add("-M", "--model", default="+", help=f"one of {', '.join(_MODELS)}; all fly the profile's vehicle")
     add("-s", "--speedup", type=float, metavar="N", help="times real time (default: SIM_SPEEDUP)")
     add("--defaults", default="", metavar="FILE,...", help="parameter files")
-    add("--sim-address", default="127.0.0.1", help="accepted without effect")
-    add("--unhide-groups", action="store_true", help="accepted without effect")
-    add("-r", "--rate", type=int, help="accepted without effect")
-    for port in range(10):
-        add(f"--serial{port}", metavar="URL", help="tcp:N serves port 5760 + N; others have no effect")
+    add("--unhide-groups", action="store_true", help="without effect")
+    for name in ("sim-address", "rate", *(f"serial{port}" for port in range(10))):
+        add(f"--{name}", metavar="VALUE", help="without effect, but that --serial1=tcp:N serves port 5760 + N")
     return parser
 
 
@@ -62,17 +60,12 @@ def defaults(text: str) -> dict[str, int | float]:
     kinds, found = {row.name: row.kind for row in rows()}, dict[str, int | float]()
     for file in filter(None, text.split(",")):
         for line in read_text(Path(file)).splitlines():
-            words = line.partition("#")[0].replace(",", " ").split()
-            if not words:
-                continue
+            name, *values = line.partition("#")[0].replace(",", " ").split() or [""]
             try:
-                name, value = words[0], float(words[1])
+                if name in kinds:
+                    found[name] = float(values[0]) if kinds[name] == "f" else round(float(values[0]))
             except (IndexError, ValueError):
-                fail(f'{file}: expected NAME VALUE, not "{line}"')
-            if name in kinds:
-                found[name] = value if kinds[name] == "f" else round(value)
-            else:
-                print(f"unknown parameter {name} of {file}")
+                raise Error(f'{file}: expected NAME VALUE, not "{line}"') from None
     return found
 
 

@@ -245,15 +245,14 @@ def _homeward_in_steps(context: TaskContext, place: Vector) -> TaskSequence:
         high_m = max(up, min(high_m, home_m + _BELOW_FENCE * behaviour.max_height_m))
     speed = behaviour.return_speed_m_s or None
     outward = atan2(y - north, x - east) if behaviour.return_faces and away_m > _ALONG_BEYOND_M else None
-    there, home_yaw = (x, y, high_m), context.home_yaw_rad
+    there, final = (x, y, high_m), (x, y, home_m + behaviour.return_final_m)
+    home_yaw = context.home_yaw_rad if behaviour.return_faces else context.yaw_rad
     legs: list[Leg] = [
         lambda begin: GoToTask(GoTo(there, begin.yaw_rad if outward is None else outward, speed), begin),
         lambda begin: GoToTask(GoTo(there, home_yaw, speed, stay_s=behaviour.return_delay_s), begin),
     ]
     if behaviour.return_final_m > 0.0:
-        legs.append(
-            lambda begin: GoToTask(GoTo((x, y, home_m + behaviour.return_final_m), home_yaw, stay_s=inf), begin)
-        )
+        legs.append(lambda begin: GoToTask(GoTo(final, home_yaw, stay_s=inf), begin))
     else:
         legs.append(lambda _: LandTask((x, y), home_yaw))
     return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), *legs)
