@@ -2,7 +2,7 @@
 
 One process, so that a harness can stop and continue it: plant and autopilot of `colibri sitl --identity ardupilot`,
 with its TCP server. As ArduCopter's, it keeps its state in the current folder, takes the radio's channels from UDP
-port 5501 + 10 N, and stands at its start again after a reboot.
+port 5501 + 10 N, stands at its start again after a reboot, and its battery never empties.
 """
 
 import os
@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from struct import iter_unpack
 from time import perf_counter, sleep
+
+from msgspec.structs import replace
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.identities.copter_parameters import rows
@@ -31,11 +33,12 @@ from colibri.mavlink.setpoints.radio import Radio
 from colibri.plant.physics.start import Start
 from colibri.plant.process.server import FramePacer, builder_of
 from colibri.plant.spec import PlantSpec
+from colibri.plant.vehicle.description import load_vehicle
 
 TCP_PORT, RADIO_PORT, PORTS_EACH = 5760, 5501, 10
 FEEDBACK = "COLIBRI_FEEDBACK"
 """Environment variable for what ArduCopter's command line has no option for."""
-_RADIO_BYTES, _FIRST_FRAMES = (16, 32), 100
+_RADIO_BYTES, _FIRST_FRAMES, _ENDLESS_AH = (16, 32), 100, 1e4
 _MODELS = ("+", "quad", "x", "X")
 
 
@@ -140,8 +143,12 @@ def specs(args: Namespace, params: Mapping[str, int | float]) -> tuple[Autopilot
     first = TCP_PORT + PORTS_EACH * args.instance
     further = [value for number in range(1, 10) if (value := getattr(args, f"serial{number}"))]
     offsets = [0, *(int(value[4:]) for value in further if value.startswith("tcp:") and value[4:].isdecimal())]
+    vehicle = load_vehicle(load_profile(AutopilotSpec().profile).simulation.vehicle)
+    if vehicle.battery is not None:
+        vehicle = replace(vehicle, battery=replace(vehicle.battery, capacity_ah=_ENDLESS_AH))
     autopilot = AutopilotSpec(
         identity="ardupilot",
+        vehicle=vehicle,
         home=args.home,
         system_id=args.instance + 1,
         gcs=tuple(f"tcpin:127.0.0.1:{first + offset}" for offset in offsets),
@@ -149,11 +156,7 @@ def specs(args: Namespace, params: Mapping[str, int | float]) -> tuple[Autopilot
         params=params,
         feedback=Feedback(os.environ.get(FEEDBACK, Feedback.STATE)),
     )
-    plant = PlantSpec(
-        home=args.home,
-        vehicle=load_profile(autopilot.profile).simulation.vehicle,
-        start=Start(psi=args.home.yaw_enu_deg)._asdict(),
-    )
+    plant = PlantSpec(home=args.home, vehicle=vehicle, start=Start(psi=args.home.yaw_enu_deg)._asdict())
     return autopilot, plant, RADIO_PORT + PORTS_EACH * args.instance
 
 

@@ -53,11 +53,15 @@ class GuidedTask(EndlessTask):
         self._loop: HeightLoop | None = None
         self._hold = HoldTask()
         self._turn: Turn | None = None
-        self.paused = False
+        self.paused = self._looks_ahead = False
 
     @property
     def setpoint(self) -> PositionSetpoint | None:
-        return self._setpoint if isinstance(self._setpoint, PositionSetpoint) else None
+        """The client's setpoint, without the heading along its way."""
+        setpoint = self._setpoint
+        if not isinstance(setpoint, PositionSetpoint):
+            return None
+        return setpoint._replace(yaw_rad=nan) if self._looks_ahead else setpoint
 
     @property
     def order(self) -> Order:
@@ -69,13 +73,13 @@ class GuidedTask(EndlessTask):
 
     def take(self, setpoint: OffboardSetpoint, context: TaskContext) -> None:
         """Fly a setpoint; velocities along the heading stay as they are on earth."""
-        self.paused = False
+        self.paused = self._looks_ahead = False
         if isinstance(setpoint, PositionSetpoint):
             setpoint = setpoint.in_enu(context.state.euler[2])._replace(time_us=context.now_us)
             if not isnan(setpoint.yaw_rad) or not isnan(setpoint.yaw_rate_rad_s):
                 self._turn = None
             elif self._settings().looks_ahead and (yaw_rad := _along(setpoint, context)) is not None:
-                self._turn, setpoint = None, setpoint._replace(yaw_rad=yaw_rad)
+                self._turn, setpoint, self._looks_ahead = None, setpoint._replace(yaw_rad=yaw_rad), True
             self._forget()
         elif not isinstance(self._setpoint, AttitudeSetpoint):
             self._forget()
