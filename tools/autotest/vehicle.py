@@ -88,6 +88,7 @@ class Vehicle:
         self._plant = self._builder.build(self._feedback, interval_us)
         self._wire = InMemory(interval_us, self._feedback, rotors=self._builder.vehicle.rotors.count)
         self._pacer = FramePacer(self._speed, perf_counter())
+        self._listen()
 
     def step(self) -> None:
         plant, pacer = self._plant, self._pacer
