@@ -83,7 +83,7 @@ class Copter:
         self._sampled: tuple[ControlSample, Decision | None, float] | None = None
         self._plant_status = NOTHING
         self.time_us: int | None = None  # of the last frame with a known state
-        self._waiting_us: int | None = None
+        self.waiting_us: int | None = None
         self._settles_by_us = 0
 
     @property
@@ -118,7 +118,7 @@ class Copter:
 
     def wait(self, now_us: int) -> None:
         """Deny commands before the first estimate; after a flight, prepare the next one."""
-        self._waiting_us = now_us
+        self.waiting_us = now_us
         if self.time_us is not None:
             self.stations.system.reboot()
 
@@ -204,9 +204,9 @@ class Copter:
         return True
 
     def _refuse(self, inbox: Iterable[Received]) -> list[Outgoing]:
-        if self._waiting_us is None:
+        if self.waiting_us is None:
             return []
         self.stations.refuse_commands("Not ready: no attitude and position estimate yet")
-        self._receive_from_stations(inbox, self._waiting_us)
+        self._receive_from_stations(inbox, self.waiting_us)
         self.stations.refuse_commands("")
         return self.stations.take_outbox()

@@ -131,7 +131,7 @@ class GroundService:
     def _log_traffic(self, traffic: StationTraffic, datagrams: list[bytes]) -> None:
         try:
             if datagrams:
-                traffic.write(self.copter.pilot.context().now_us, datagrams)
+                traffic.write(self.copter.time_us or self.copter.waiting_us or 0, datagrams)
         except LogError as error:
             self._status.say("said", f"{error}; flying on")
 

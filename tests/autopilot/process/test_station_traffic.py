@@ -1,11 +1,17 @@
 from pathlib import Path
+from socket import AF_INET, SOCK_DGRAM, socket
 
 import pytest
 
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.process import station_traffic
+from colibri.autopilot.process.ground import GroundService
 from colibri.autopilot.process.station_traffic import StationTraffic
+from colibri.autopilot.spec import AutopilotSpec
+from colibri.common.process.status import Status
 from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter, decode
+from colibri.plant.vehicle.description import load_vehicle
 
 CODEC = Codec(255, 190)
 BEAT = CODEC.encode("HEARTBEAT", 6, 8, 0, 0, 0, 3)
@@ -36,3 +42,17 @@ def test_a_flood_does_not_fill_the_disk(tmp_path: Path, monkeypatch: pytest.Monk
         traffic.write(1, [BEAT])
     traffic.close()
     assert len(frames(tmp_path)) == 3
+
+
+def test_a_message_before_the_first_estimate_is_kept(tmp_path: Path) -> None:
+    with socket(AF_INET, SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        place = free.getsockname()
+    spec = AutopilotSpec(plant="", out=tmp_path, state=tmp_path, tlog=True, gcs=(f"udpin:{place[0]}:{place[1]}",))
+    ground = GroundService(spec, load_profile("flight"), load_vehicle("hummingbird"), Status("autopilot", as_json=False))
+    ground.copter.wait(8000)
+    with socket(AF_INET, SOCK_DGRAM) as station:
+        station.sendto(BEAT, place)
+        ground.serve(0.0)
+    ground.close()
+    assert [frame for time_us, frame in frames(tmp_path) if time_us == spec.boot_unix_us + 8000] == [BEAT]
