@@ -49,7 +49,8 @@ def test_a_message_before_the_first_estimate_is_kept(tmp_path: Path) -> None:
         free.bind(("127.0.0.1", 0))
         place = free.getsockname()
     spec = AutopilotSpec(plant="", out=tmp_path, state=tmp_path, tlog=True, gcs=(f"udpin:{place[0]}:{place[1]}",))
-    ground = GroundService(spec, load_profile("flight"), load_vehicle("hummingbird"), Status("autopilot", as_json=False))
+    status = Status("autopilot", as_json=False)
+    ground = GroundService(spec, load_profile("flight"), load_vehicle("hummingbird"), status)
     ground.copter.wait(8000)
     with socket(AF_INET, SOCK_DGRAM) as station:
         station.sendto(BEAT, place)
