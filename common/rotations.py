@@ -18,6 +18,16 @@ def normalized(q: Quaternion) -> Quaternion:
     return (w / norm, x / norm, y / norm, z / norm)
 
 
+def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
+    (w, x, y, z), (v, i, j, k) = a, b
+    return (
+        w * v - x * i - y * j - z * k,
+        w * i + x * v + y * k - z * j,
+        w * j - x * k + y * v + z * i,
+        w * k + x * j - y * i + z * v,
+    )
+
+
 def rotation_matrix(q: Quaternion) -> Matrix:
     """Return R of THESIS [2.6], rows first: earth = R · body."""
     w, x, y, z = q

@@ -34,7 +34,7 @@ from colibri.certification.certificate import ProofEntry
 from colibri.certification.loop import Number, RangeError, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
-from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, quaternion_product
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -166,7 +166,7 @@ class PlannedAttitude:
             speeds=np.sqrt(self._squared(thrust_n, z[_MOMENTS])), charge_ah=self._charge_ah
         )
         half = 0.5 * z[_ANGLES]
-        attitude = _product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))
+        attitude = quaternion_product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))
         nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[_RATES].tolist()
         state = VehicleState(nowhere, nowhere, attitude, euler_from_quaternion(attitude), (p, q, r))
         demand = AttitudeDemand(np.tile(held, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
@@ -227,13 +227,3 @@ def _mirrored(rows: Array) -> Array:
     own = (signs[:, _MOMENTS, None] * signs[:, None, :] == 1).all(axis=0)
     kept: Array = np.where(own, rows, 0.0)
     return kept
-
-
-def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float, float]:
-    (w, x, y, z), (v, i, j, k) = a, b
-    return (
-        w * v - x * i - y * j - z * k,
-        w * i + x * v + y * k - z * j,
-        w * j - x * k + y * v + z * i,
-        w * k + x * j - y * i + z * v,
-    )

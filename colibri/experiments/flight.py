@@ -1,12 +1,17 @@
 """`colibri.fly`: fly from Python."""
 
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
+from io import BytesIO
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 from warnings import warn
 
 import msgspec
+import numpy as np
 
 from colibri.analysis.figure_series import FigureSeries
 from colibri.analysis.logs import log_of
@@ -14,9 +19,10 @@ from colibri.analysis.outcome import REPORT, files_of, fly_to_its_end, report_of
 from colibri.analysis.recording import FlightReader, columns_of
 from colibri.analysis.report import Report, report_rows
 from colibri.common.config import UNREADABLE
-from colibri.common.errors import checked, unknown
+from colibri.common.errors import Error, checked, unknown
 from colibri.common.files import read_bytes
 from colibri.common.spec import from_values, keywords_of
+from colibri.common.types import Array
 from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
@@ -24,19 +30,6 @@ from colibri.flights.spec import FlightSpec, OptionError
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.ulog.flight_topics import ESTIMATE, TRUTH
 from colibri.mavlink.ulog.log import TopicReader
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-from base64 import b64encode
-from collections.abc import Iterable, Sequence
-from html import escape
-from io import BytesIO
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from colibri.common.errors import Error
-from colibri.common.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

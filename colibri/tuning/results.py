@@ -1,33 +1,28 @@
 """The results of a tuning."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.analysis.tables import Row, comma_separated
 from colibri.autopilot.control.profile import Profile, ProfileTables
+from colibri.campaigns.definition import Campaign
 from colibri.campaigns.factors import key_of, shown
+from colibri.campaigns.flight_table import FlightTable
+from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.results import CampaignResults
 from colibri.common.errors import unknown
-from colibri.tuning.definition import Tuning, TuningError
+from colibri.common.types import Array
+from colibri.tuning.definition import SHARE_LOST, Objective, Tuning, TuningError, value_of
 from colibri.tuning.trials import FinishedTrial
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-from collections.abc import Iterator
-from typing import NamedTuple
-
-import numpy as np
-from numpy.random import PCG64, Generator, SeedSequence
-
-from colibri.campaigns.definition import Campaign
-from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import FlightResult
-from colibri.common.types import Array
-from colibri.tuning.definition import SHARE_LOST, Objective, value_of
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
 ALL = "all"

@@ -4,27 +4,21 @@ Flights that saturate, tumble or use noisy sensors amplify one bit within a seco
 where it matters.
 """
 
-from typing import TYPE_CHECKING, Any
-
-from colibri.autopilot.commander.rules.modes import Mode
-from colibri.mavlink.hil.feedback import Feedback
-
-if TYPE_CHECKING:
-    from colibri.sitl.vehicle import Sitl
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.outcome import keep_flight
+from colibri.autopilot.commander.rules.modes import Mode
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.backends.setting import setting_of
 
 if TYPE_CHECKING:
     from colibri.sitl.vehicle import Sitl
-
 
 _WAYPOINTS_FILE = "waypoints.csv"
 

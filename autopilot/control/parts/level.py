@@ -6,7 +6,7 @@ import numpy as np
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.matrices import matmul, matvec, norm
-from colibri.common.rotations import euler_from_quaternion, nearest_turn, rotation_matrix
+from colibri.common.rotations import euler_from_quaternion, nearest_turn, quaternion_product, rotation_matrix
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
@@ -23,29 +23,18 @@ def levelled(vehicle: Vehicle) -> tuple[Vehicle, Quaternion | None]:
             break
         length = norm(np.array([1.0 + z, -y, x]))
         turn = ((1.0 + z) / length, -y / length, x / length, 0.0)
-        to_body = turn if to_body is None else _product(to_body, turn)
+        to_body = turn if to_body is None else quaternion_product(to_body, turn)
         vehicle = _seen_from(vehicle, np.array(rotation_matrix(turn)).T.copy())
     return vehicle, to_body
 
 
 def seen_level(state: VehicleState, to_body: Quaternion) -> VehicleState:
     """Return a state with its attitude and rates those of the level frame."""
-    attitude = _product(state.attitude, to_body)
+    attitude = quaternion_product(state.attitude, to_body)
     phi, theta, psi = euler_from_quaternion(attitude)
     rates = matvec(np.array(rotation_matrix(to_body)).T, np.array(state.rate_flu_rad_s)).tolist()
     euler = (phi, theta, nearest_turn(psi, state.euler[2]))
     return state._replace(attitude=attitude, euler=euler, rate_flu_rad_s=(rates[0], rates[1], rates[2]))
-
-
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
 
 
 def _seen_from(vehicle: Vehicle, turn: Array) -> Vehicle:
