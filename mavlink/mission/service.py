@@ -176,7 +176,7 @@ class MissionService:
 
     def current(self) -> Fields:
         progress = self._progress()
-        total = len(self.plans[MISSION].items) or NO_MISSION_TOTAL
+        total = len(self.plans[MISSION].items) or (0 if self._offset else NO_MISSION_TOTAL)
         return (self._seq(), total, progress.state, progress.mode, *self.ids)
 
     @property
