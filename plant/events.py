@@ -177,7 +177,9 @@ def _of_text(text: str) -> Event:
             elif kind == "mode" and arm:
                 values["arm"] = {"arm": True}[arm]
     except (ValueError, LookupError):
-        raise EventError(f'must be T:KIND=VALUE with {FORMS}; "5:payload=0.2" say, not "{shown(text)}"') from None
+        raise EventError(
+            f'must be T:KIND=VALUE with {FORMS}; for example "5:payload=0.2", not "{shown(text)}"'
+        ) from None
     return event_of(values | {"event": kind})
 
 

@@ -157,9 +157,7 @@ class OnnxLaw(PolicyLaw):
         wanted = [[self._seen.size], [self._actions]]
         for what, given, right in zip(("observations", "actions"), shapes, wanted, strict=True):
             if isinstance(given[0] if given else None, int) and given != right:
-                raise PolicyError(
-                    f"controller {file.name}: its {what} have {given[0]} values, by its TOML file they have {right[0]}"
-                )
+                raise PolicyError(f"controller {file.name}: the model has {given[0]} {what}, its TOML file {right[0]}")
 
     @property
     def _inputs(self) -> PolicyInputs:

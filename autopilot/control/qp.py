@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.errors import AutopilotError
+from colibri.common.errors import unknown
 from colibri.common.types import Array
 
 IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
@@ -209,7 +210,7 @@ def check_solver(name: str) -> None:
     if name in qpsolvers.available_solvers:
         return
     if name not in _known_solvers():
-        raise SolverError(f"unknown solver {name}: installed are {', '.join(installed_solvers())}")
+        raise SolverError(unknown("solver", name, installed_solvers()))
     extra = "colibri-sitl[solvers]" if name in IN_SOLVERS_EXTRA else f"qpsolvers[{name}]"
     raise SolverError(f"solver {name} is not installed: pip install '{extra}'")
 

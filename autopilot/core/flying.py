@@ -39,7 +39,7 @@ class Flying:
         return self._guard(table.PLAIN_LAW, actuation.decide_plainly, lambda: None, now_us, state, RESTS)
 
     def descend(self, now_us: int) -> None:
-        """Fly the last resort for good."""
+        """Begin the descent, which is permanent."""
         pilot, actuation = self._parts.pilot, self._parts.actuation
         if actuation.descent is None:
             actuation.descent = Descent(now_us, pilot.ground.height_m, standing=pilot.ground.standing)

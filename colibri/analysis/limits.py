@@ -45,7 +45,7 @@ def loss_limit(text: str) -> LossLimit:
     except ValueError:
         most = -1.0
     if most < 0.0 or (percent and most > 100.0):
-        raise ArgumentTypeError(f"must be a number of flights or a percentage, 3 or 5% say, not {text}")
+        raise ArgumentTypeError(f'must be a number of flights or a percentage, for example 3 or 5%, not "{text}"')
     return LossLimit(most, percent)
 
 

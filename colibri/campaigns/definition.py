@@ -249,7 +249,7 @@ def read_seeds(given: Any) -> Sequence[int]:
     ends = (found[0], found[-1]) if isinstance(found, range) and found else found  # a range is not expanded
     right = all(type(seed) is int and 0 <= seed < _MAX_SEED for seed in ends)
     if not ends or not right or (not isinstance(found, range) and len(set(found)) < len(found)):
-        raise CampaignError(f"seeds: expected 1-20, a seed, or several different ones, not {given}")
+        raise CampaignError(f'seeds: must be FIRST-LAST, a number, or a list of different numbers, not "{given}"')
     return found if isinstance(found, range) else tuple(found)
 
 

@@ -282,7 +282,7 @@ def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
     rates_left = rates - _turns(n, box)
     rotors_left = [n.headroom - each for each in _unsure_speeds(n, box)]
     if min(*angles_left, *rates_left) <= 0:
-        raise RangeError("a control interval is long enough to leave these ranges of angles and rates")
+        raise RangeError("the vehicle can leave these ranges of angles and rates within one control interval")
     if min(map(min, rotors_left)) <= 0:
         raise RangeError("the commands beyond the gain exceed the rotors")
     change = n.commanded[0] - eye[_COMMANDS]

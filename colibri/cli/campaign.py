@@ -45,14 +45,14 @@ def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[
 
 
 def _setting(text: str) -> tuple[str, Any]:
-    key, values = _pair(text, "KEY=VALUES, body.mass_kg=0.6:0.8:5 say")
+    key, values = _pair(text, "KEY=VALUES, for example body.mass_kg=0.6:0.8:5")
     if values.count(":") == 1 and all(isinstance(_value(part), int | float) for part in values.split(":")):
         raise CampaignError(f"{key}: a range is FIRST:LAST:COUNT, for example {values}:5, not {values}")
     return key, values if values.count(":") == 2 else [_value(each) for each in values.split(",")]
 
 
 def _draw(text: str) -> tuple[str, Any]:
-    key, drawn = _pair(text, "KEY=DISTRIBUTION, plant-vehicle.body.mass_kg=uniform:0.6:0.8 say")
+    key, drawn = _pair(text, "KEY=DISTRIBUTION, for example plant-vehicle.body.mass_kg=uniform:0.6:0.8")
     name, _, rest = drawn.partition(":")
     return key, {name: [_value(each) for each in rest.split("," if name == "choice" else ":")]}
 

@@ -394,7 +394,7 @@ def _keyword(text: str) -> tuple[str, Any]:
 
     name, equals, value = text.partition("=")
     if not equals or not name:
-        raise ArgumentTypeError(f'must be KEY=VALUE, "action=rates" say, not "{text}"')
+        raise ArgumentTypeError(f'must be KEY=VALUE, for example "action=rates", not "{text}"')
     try:
         return name, msgspec.json.decode(value)
     except msgspec.DecodeError:

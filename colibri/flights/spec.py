@@ -42,7 +42,7 @@ def window_of(text: str) -> Window:
     except ValueError:
         read = Window(0.0, 0.0)
     if not 0.0 <= read.begin_s < read.end_s:
-        raise ArgumentTypeError(f'must be BEGIN:END in s, "10:30" say, not "{text}"')
+        raise ArgumentTypeError(f'must be BEGIN:END in s, for example "10:30", not "{text}"')
     return read
 
 
@@ -52,7 +52,7 @@ def parameter(text: str) -> dict[str, float]:
         pairs = [pair.partition("=") for pair in text.split(",")]
         return {name.strip(): number(value) for name, _, value in pairs}
     except ValueError:
-        raise ArgumentTypeError(f'must be NAME=VALUE, "VEH_MASS=0.7" say, not "{text}"') from None
+        raise ArgumentTypeError(f'must be NAME=VALUE, for example "VEH_MASS=0.7", not "{text}"') from None
 
 
 def merged(given: Iterable[Any]) -> dict[str, float]:

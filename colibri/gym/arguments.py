@@ -78,7 +78,7 @@ def wind_of(given: Any) -> Wind:
     except ArgumentTypeError as error:
         raise GymError(f"draw: wind: {error}") from None
     if not isinstance(wind, Wind):
-        raise GymError(f'draw: wind must be constant, "5@270" say, not a file "{shown(given)}"')
+        raise GymError(f'draw: wind must be constant, for example "5@270", not a file "{shown(given)}"')
     return wind
 
 

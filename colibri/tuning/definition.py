@@ -313,7 +313,9 @@ def _space(tables: TuningTables) -> dict[str, Range]:
             raise TuningError(f"tune: {name.rstrip(SCALED)} is given twice")
         space[name] = read_range(name, values)
     if not space:
-        raise TuningError('tune: no numbers: add for example "controllers.LAW.KEY" = { uniform = [2, 20] }')
+        raise TuningError(
+            'tune: at least one number is required, for example "controllers.LAW.KEY" = { uniform = [2, 20] }'
+        )
     return space
 
 

@@ -6,6 +6,7 @@ from argparse import SUPPRESS, ArgumentTypeError
 from math import isfinite
 from typing import Any, NoReturn
 
+from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import fail
 
 
@@ -30,6 +31,10 @@ class ArgumentParser(argparse.ArgumentParser):
     def flag(self, name: str, help: str) -> None:
         self.add_argument(name, action="store_true", help=help)
 
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            raise argparse.ArgumentError(action, unknown("value", value, action.choices))
+
     def error(self, message: str) -> NoReturn:
         fail(f"{message} (see {self.prog} --help)")
 
@@ -44,14 +49,14 @@ def number(text: str) -> float:
 def positive(text: str) -> float:
     value = number(text)
     if value <= 0.0:
-        raise ArgumentTypeError(f"must be above zero, not {text}")
+        raise ArgumentTypeError(f'must be above zero, not "{text}"')
     return value
 
 
 def natural(text: str) -> int:
     value = int(text)
     if value < 0:
-        raise ArgumentTypeError(f"must not be below zero, not {text}")
+        raise ArgumentTypeError(f'must be at least 0, not "{text}"')
     return value
 
 
@@ -62,5 +67,5 @@ def seeds(text: str) -> range:
     except ValueError:
         chosen = range(0)
     if not chosen:
-        raise ArgumentTypeError(f"expected FIRST-LAST, for example 1-50, not {text}")
+        raise ArgumentTypeError(f'must be FIRST-LAST, for example 1-50, not "{text}"')
     return chosen

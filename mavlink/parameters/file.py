@@ -48,18 +48,18 @@ def read(text: str, parameters: Parameters) -> dict[str, Value]:
 def _parameter(cells: list[str], parameters: Parameters) -> Parameter | None:
     for what, cell in zip(("vehicle", "component"), cells, strict=False):
         if not cell.isascii() or not cell.isdigit() or int(cell) > _MAX_ID:
-            raise ValueError(f"no {what} id: {cell!r}")
+            raise ValueError(f'{what} id "{cell}": must be a number from 0 to {_MAX_ID}')
     if int(cells[1]) != AUTOPILOT_COMPONENT:
         return None
     index = parameters.index(cells[2])
     if index is None:
-        raise ValueError("there is no such parameter")
+        raise ValueError("unknown parameter")
     return parameters.at(index)
 
 
 def _value(parameter: Parameter, text: str, kind: str) -> Value:
     if kind != str(parameter.kind.value):
-        raise ValueError(f"its type is {parameter.kind.value}, not {kind!r}")
+        raise ValueError(f'type must be {parameter.kind.value}, not "{kind}"')
     value: Value
     try:
         value = int(text) if parameter.kind == ParamType.INT else float32(float(text))

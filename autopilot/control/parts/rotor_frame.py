@@ -27,7 +27,7 @@ _TURNS_DEG = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 
 
 class RotorFrame:
-    """A vehicle in the rotor order and the axes of a law from elsewhere, a learned policy say.
+    """A vehicle in the rotor order and the axes of a law from elsewhere, such as a learned policy.
 
     Attributes:
         order: For each of the law's rotors, its index in the vehicle file.
@@ -67,7 +67,7 @@ class RotorFrame:
         )
 
     def to_vehicle(self, of_rotors: Sequence[float] | Array) -> Array:
-        """Return values of the law's rotors (4,), speeds say, in the vehicle's order."""
+        """Return values of the law's rotors (4,), such as speeds, in the vehicle's order."""
         placed = np.empty(len(self.order))
         placed[self.order] = of_rotors
         return placed

@@ -26,7 +26,7 @@ class ForceLimits(NamedTuple):
 
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force in place: height before position; without a tilt limit its direction stays."""
+    """Limit a force in place. Height has priority over position; without a tilt limit the direction is kept."""
     if not limits.upright:
         total = norm(force)
         if total > limits.max_n:

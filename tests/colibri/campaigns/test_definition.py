@@ -107,7 +107,7 @@ def test_seeds_are_read(given: Any, seeds: tuple[int, ...]) -> None:
 
 @pytest.mark.parametrize("given", ["3-1", "x", "1-", "-1", [], [1, 1], [1.5], -4, None])
 def test_what_is_no_seed_is_refused(given: Any) -> None:
-    with pytest.raises(CampaignError, match="seeds: expected 1-20, a seed, or several different ones, not"):
+    with pytest.raises(CampaignError, match="seeds: must be FIRST-LAST, a number, or a list of different numbers, not"):
         read_seeds(given)
 
 

@@ -70,7 +70,9 @@ def test_exit_code_message_json_and_junit_agree(
 
 @pytest.mark.parametrize("text", ["-1", "1.5", "x", "", "101%", "%", "nan%"])
 def test_no_limit_of_losses_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(ArgumentTypeError, match="must be a number of flights or a percentage, 3 or 5% say, not "):
+    with pytest.raises(
+        ArgumentTypeError, match="must be a number of flights or a percentage, for example 3 or 5%, not "
+    ):
         loss_limit(text)
 
 

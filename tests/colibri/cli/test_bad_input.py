@@ -29,7 +29,7 @@ BAD_OPTIONS = [
     ("spiral --profile fast", 'unknown profile "fast" (choose agile, flight, path, se3, '),
     ("spiral --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose'),
     ("spiral --vehicle \udcfc.toml", "\\udcfc.toml is not UTF-8 by"),
-    ("spiral --solver simplex", "unknown solver simplex: installed are"),
+    ("spiral --solver simplex", 'unknown solver "simplex" (choose'),
     ("spiral --solver gurobi", "gurobi is not installed: pip install"),
     ("spiral --profile se3 --solver daqp", "controller geometric-se3 solves no QP: leave --solver out"),
     ("spiral --controller pid", 'unknown controller "pid" (choose cascade, geometric-se3, global-lpv-mpc, lpv-mpc'),

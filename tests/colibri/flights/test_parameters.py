@@ -43,7 +43,7 @@ def test_a_vehicle_parameter_is_the_autopilots_alone() -> None:
         ({"LPV_R_NEXT": "much"}, 'params: LPV_R_NEXT must be a number, not str "much"'),
         ({"LPV_R_NEXT": float("nan")}, 'params: LPV_R_NEXT must be a number, not float "nan"'),
         ({"LPV_R_NEXT": True}, "params: LPV_R_NEXT must be a number, not bool"),
-        ("LPV_R_NEXT", 'params: must be NAME=VALUE, "VEH_MASS=0.7" say, not "LPV_R_NEXT"'),
+        ("LPV_R_NEXT", 'params: must be NAME=VALUE, for example "VEH_MASS=0.7", not "LPV_R_NEXT"'),
         ([3], 'params: must be a table of numbers, not int "3"'),
     ],
 )

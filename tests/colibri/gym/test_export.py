@@ -81,7 +81,7 @@ def test_a_policy_meets_the_requirements_on_laws() -> None:
         ({"action": "velocity"}, "action velocity is a setpoint"),
         ({"gates": [(0, 0, 2), (1, 0, 2)], "action": "rates"}, "gates are no reference"),
         ({"rate": 300.0, "action": "rates"}, "rate must be whole milliseconds"),
-        ({"history": 2, "action": "rates"}, "its observations have 22 values, by its TOML file they have 26"),
+        ({"history": 2, "action": "rates"}, "the model has 22 observations, its TOML file 26"),
     ],
 )
 def test_an_unsuitable_environment_is_refused(options: dict[str, Any], message: str, policy: Path) -> None:
@@ -120,7 +120,7 @@ def test_the_command_exports_a_policy(policy: Path, capsys: pytest.CaptureFixtur
     assert capsys.readouterr().out.strip() == str(policy.with_suffix(".toml"))
     for wrong, message in (
         ("action=rate", "unknown action"),
-        ("preview=1", "its observations have 22"),
+        ("preview=1", "the model has 22 observations"),
         ("rates", "KEY=VALUE"),
     ):
         with pytest.raises(SystemExit):
