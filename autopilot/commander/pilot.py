@@ -60,9 +60,6 @@ class Sensed(NamedTuple):
     """Inputs of a control sample; references are for `delay_us` later, when commands take effect.
 
     Attributes:
-        waited_us: Path time lost since the previous sample.
-        path_speed: Rate of path time relative to the clock.
-        lift: Modelled thrust over weight, once a sensor has failed.
         push: Tilting moment then that the rotors do not cause, over that of a quarter of the weight at a rotor.
     """
 
@@ -71,9 +68,9 @@ class Sensed(NamedTuple):
     steered: ClientInputs = NOT_STEERED
     position_known: bool = True
     delay_us: int = 0
-    waited_us: int = 0
-    path_speed: float = 1.0
-    lift: float | None = None
+    waited_us: int = 0  # path time lost since the previous sample
+    path_speed: float = 1.0  # rate of path time relative to the clock
+    lift: float | None = None  # modelled thrust over weight, once a sensor has failed
     push: float = 0.0
 
 

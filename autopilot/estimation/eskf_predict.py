@@ -43,7 +43,6 @@ class Noise(NamedTuple):
     Attributes:
         force, rate: (m/s²)²/Hz and (rad/s)²/Hz.
         gyro_bias, accel_bias: Of the walks, (rad/s²)²/Hz and (m/s³)²/Hz.
-        gps_drift: Variances of the Gauss-Markov drift, m², ENU.
         baro_offset, hard_iron: Of the walks, m²/s and gauss²/s.
     """
 
@@ -51,7 +50,7 @@ class Noise(NamedTuple):
     rate: float
     gyro_bias: float
     accel_bias: float
-    gps_drift: tuple[float, float, float]
+    gps_drift: tuple[float, float, float]  # variances of the Gauss-Markov drift, m², ENU
     gps_drift_time_s: float
     baro_offset: float
     hard_iron: float

@@ -35,10 +35,7 @@ class Health(NamedTuple):
     """Usable parts of the estimate: roll and pitch to 10°, yaw to 15°, velocity to 1 m/s, position to 5 m.
 
     Attributes:
-        dead_reckoning: Without GPS, position and velocity drift.
-        gps_glitch: Fixes are received but rejected.
         accel_bias, gyro_bias: False for a while after a reset.
-        not_accepted: Other sensors without valid values.
     """
 
     attitude: bool
@@ -47,14 +44,14 @@ class Health(NamedTuple):
     vertical_velocity: bool
     horizontal_position: bool
     height: bool
-    dead_reckoning: bool
+    dead_reckoning: bool  # without GPS, position and velocity drift
     gps_lost_since_us: int | None
-    gps_glitch: bool
+    gps_glitch: bool  # fixes are received but rejected
     accelerometer: bool
     gyroscope: bool
     accel_bias: bool
     gyro_bias: bool
-    not_accepted: tuple[str, ...]
+    not_accepted: tuple[str, ...]  # other sensors without valid values
 
     @property
     def any_lost(self) -> bool:
@@ -86,26 +83,18 @@ class FilterCheck(NamedTuple):
     """The filter at its own time, for consistency checks.
 
     Attributes:
-        state: Position, velocity (ENU), attitude (wxyz), (10,).
-        covariance: Upper triangle by rows, (45,).
         nis, accepted: Sum and number of accepted NIS, by kind.
     """
 
     time_us: int
-    state: tuple[float, ...]
-    covariance: tuple[float, ...]
+    state: tuple[float, ...]  # position, velocity (ENU), attitude (wxyz), (10,)
+    covariance: tuple[float, ...]  # upper triangle by rows, (45,)
     nis: tuple[float, ...]
     accepted: tuple[int, ...]
 
 
 class Estimate(NamedTuple):
-    """The vehicle at one instant; rates without bias, biases FLU (of a modelled force ENU), standard deviations ENU.
-
-    Attributes:
-        resets: Number of resets of a part.
-        smoothing_m: Filter minus published position.
-        check: Ten times a second.
-    """
+    """The vehicle at one instant; rates without bias, biases FLU (of a modelled force ENU), standard deviations ENU."""
 
     frame: StateFrame
     position_std_m: Vector
@@ -116,6 +105,6 @@ class Estimate(NamedTuple):
     health: Health
     tests: Tests
     rejected: Rejections
-    resets: int
-    smoothing_m: Vector
-    check: FilterCheck | None
+    resets: int  # number of resets of a part
+    smoothing_m: Vector  # filter minus published position
+    check: FilterCheck | None  # ten times a second

@@ -62,24 +62,18 @@ _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 @dataclass(frozen=True, slots=True)
 class StationSettings:
-    """Settings of a vehicle towards ground stations.
-
-    Attributes:
-        boot_unix_us: Unix time at simulated time 0, µs; 0 if unknown.
-        logs: Folder of flight logs; by default `logs` of the files.
-        reports: Whether samples are reported to ground stations and logged.
-    """
+    """Settings of a vehicle towards ground stations."""
 
     system_id: int
     identity: str
     origin: Geodetic
-    boot_unix_us: int = 0
+    boot_unix_us: int = 0  # unix time at simulated time 0, µs; 0 if unknown
     signing: Signing | None = None
     files: Files | None = None
-    logs: Files | None = None
+    logs: Files | None = None  # folder of flight logs; by default `logs` of the files
     feedback: Feedback = Feedback.STATE
     relays_faults: bool = True
-    reports: bool = True
+    reports: bool = True  # whether samples are reported to ground stations and logged
 
 
 def home_item(home: Home) -> MissionItem:

@@ -25,10 +25,6 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     Attributes:
         solver, delay_s: Replace the profile's.
-        floor_m: By default the ground.
-        boot_unix_us: 0 for simulated time.
-        history: Saved state of the flight, after a kill.
-        first_us: First answered frame.
     """
 
     profile: str
@@ -38,15 +34,15 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     vehicle: str
     feedback: Feedback
     track: str | None
-    floor_m: float | None = None
+    floor_m: float | None = None  # by default the ground
     origin: Geodetic
-    boot_unix_us: int = 0
+    boot_unix_us: int = 0  # 0 for simulated time
     system_id: int
     identity: str
     ground: bool
     values: dict[str, Value] = {}
-    history: bytes = b""
-    first_us: int = 0
+    history: bytes = b""  # saved state of the flight, after a kill
+    first_us: int = 0  # first answered frame
     profile_tables: Profile
     vehicle_tables: Vehicle
     track_file: str | None = None

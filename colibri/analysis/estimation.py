@@ -54,15 +54,13 @@ class Estimation(NamedTuple):
 
     Attributes:
         position_m, attitude_rad: Estimated minus true, ENU and roll, pitch, yaw, (3, n).
-        control_m: Distance from the reference, (n,).
-        nees: Of position, velocity and attitude, (m,).
         nis, accepted: Cumulative NIS and innovations by `kinds`, (k, m).
     """
 
     position_m: Array
     attitude_rad: Array
-    control_m: Array
-    nees: Array
+    control_m: Array  # distance from the reference, (n,)
+    nees: Array  # of position, velocity and attitude, (m,)
     nis: Array
     accepted: Array
     kinds: tuple[str, ...]

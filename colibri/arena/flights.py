@@ -44,22 +44,14 @@ class Published(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class ArenaSet(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The file of a set.
+    """The file of a set."""
 
-    Attributes:
-        vehicle: Of laws and plant, without the parts `without`; a file may lie beside that of the set.
-        tracks: Tracks by name; `{speed}` is replaced.
-        speeds: Top speeds of tracks, m/s.
-        worlds: Disturbances by name, each as factors of a campaign.
-        duration_s: Of the longest flight; by default tracks without an end last 100 s.
-    """
-
-    vehicle: str
-    tracks: dict[str, str]
-    worlds: dict[str, dict[str, Any]]
+    vehicle: str  # of laws and plant, without the parts `without`; a file may lie beside that of the set
+    tracks: dict[str, str]  # tracks by name; `{speed}` is replaced
+    worlds: dict[str, dict[str, Any]]  # disturbances by name, each as factors of a campaign
     without: tuple[Part, ...] = ()
-    speeds: dict[str, tuple[Positive, ...]] = msgspec.field(default_factory=dict)
-    duration_s: float = inf
+    speeds: dict[str, tuple[Positive, ...]] = msgspec.field(default_factory=dict)  # top speeds of tracks, m/s
+    duration_s: float = inf  # of the longest flight; by default tracks without an end last 100 s
     published: tuple[Published, ...] = ()
 
     def __post_init__(self) -> None:

@@ -88,20 +88,17 @@ class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """Tables shared by the files of campaigns and tunings.
 
     Attributes:
-        seeds: One, several, or `1-20`; every combination of the grid is flown with each.
-        root_seed: Seed of the draws.
         grid: Factors with several values. A factor that is neither option nor key has levels: named tables of settings.
-        draw: Factors drawn at random for each flight.
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")
     name: str = "campaign"
-    seeds: Any = "0"
-    root_seed: int = 0
+    seeds: Any = "0"  # one, several, or `1-20`; every combination of the grid is flown with each
+    root_seed: int = 0  # seed of the draws
     metrics: Any = None
     fly: dict[str, Any] = {}
     grid: dict[str, Any] = {}
-    draw: dict[str, Any] = {}
+    draw: dict[str, Any] = {}  # factors drawn at random for each flight
 
 
 Tables = TypeVar("Tables", bound=FlightTables)

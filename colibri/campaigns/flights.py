@@ -67,22 +67,15 @@ class Common(NamedTuple):
 
 
 class FlightResult(NamedTuple):
-    """The result of one flight.
-
-    Attributes:
-        why: Reason of the verdict; empty if flown.
-        sha256: Hash of the trajectory; empty without one.
-        contents: Hash of all inputs, as in the provenance.
-        files: Logs to keep, by path relative to the campaign's folder.
-    """
+    """The result of one flight."""
 
     flight: int
     verdict: Verdict
-    why: str
+    why: str  # reason of the verdict; empty if flown
     metrics: tuple[float | None, ...]
-    sha256: str
-    contents: str = ""
-    files: Mapping[str, bytes] = {}
+    sha256: str  # hash of the trajectory; empty without one
+    contents: str = ""  # hash of all inputs, as in the provenance
+    files: Mapping[str, bytes] = {}  # logs to keep, by path relative to the campaign's folder
 
 
 def common_of(campaign: Campaign, *, remote: bool = False) -> Common:

@@ -51,36 +51,24 @@ class CertifiedConditions(NamedTuple):
 
 
 class AttitudeNumbers(NamedTuple):
-    """The numbers of a loop, as a certificate holds them.
-
-    Attributes:
-        stays: exp(-h / lag), to 16 digits.
-        commanded: C, (2, 3, 12): commanded and remembered moments.
-        unsure: Bounds of their further dependence on each state, (2, 3, 12).
-        angles: Ranges, as in `of_error`.
-        momentum_n_m_s: Range of the rotors' |h| along body z.
-        spin_s: κ Iz of rotors at one speed; `spin_spread_s` is its variation by each moment.
-        from_moments: Squared rotor speeds of moments, in units of the largest, (4, 3).
-        headroom: Squared speed that the thrust leaves to moments, same units.
-        disturbance_n_m: Largest |d|.
-    """
+    """The numbers of a loop, as a certificate holds them."""
 
     interval_s: Any
     lag_s: Any
-    stays: Any
+    stays: Any  # exp(-h / lag), to 16 digits
     inertia_kg_m2: Any
-    commanded: Any
-    unsure: Any
-    angles: Any
+    commanded: Any  # c, (2, 3, 12): commanded and remembered moments
+    unsure: Any  # bounds of their further dependence on each state, (2, 3, 12)
+    angles: Any  # ranges, as in `of_error`
     rates_rad_s: Any
-    momentum_n_m_s: Any
-    spin_s: Any
+    momentum_n_m_s: Any  # range of the rotors' |h| along body z
+    spin_s: Any  # κ Iz of rotors at one speed; `spin_spread_s` is its variation by each moment
     spin_spread_s: Any
     max_increment_n_m: Any
-    from_moments: Any
+    from_moments: Any  # squared rotor speeds of moments, in units of the largest, (4, 3)
     to_moments: Any
-    headroom: Any
-    disturbance_n_m: Any
+    headroom: Any  # squared speed that the thrust leaves to moments, same units
+    disturbance_n_m: Any  # largest |d|
     angle_weight: Any
     rate_weight: Any
     increment_weight: Any

@@ -118,19 +118,13 @@ class ProofEntry(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """Proofs for the largest ranges, and at half of their scale.
-
-    Attributes:
-        invariant: The largest set that the disturbed loop never leaves, within all limits.
-        attractor: The smallest set that every trajectory tends to.
-        terminal: A terminal weight that keeps plans feasible and decreases their cost.
-    """
+    """Proofs for the largest ranges, and at half of their scale."""
 
     largest: ProofEntry
     decay: ProofEntry
-    invariant: ProofEntry
-    attractor: ProofEntry
-    terminal: ProofEntry
+    invariant: ProofEntry  # the largest set that the disturbed loop never leaves, within all limits
+    attractor: ProofEntry  # the smallest set that every trajectory tends to
+    terminal: ProofEntry  # a terminal weight that keeps plans feasible and decreases their cost
 
 
 def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:

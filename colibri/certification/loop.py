@@ -37,11 +37,6 @@ class UncertainLoop(NamedTuple):
     Attributes:
         vertices, entries, channels: A, (v, n, n), E, (n, m), and Y, (k, n).
         gains, offsets: N, (m, k), and D, (m,), not negative.
-        disturbance: B, (n, d).
-        limits: Rows f, (l, n): |f z| <= 1.
-        starts: Desired starts, (s, n), each along one axis.
-        stage: Stage cost, (n, n).
-        mirrors: Signs of states, (g, n), that map the polytope to itself.
     """
 
     vertices: AnyArray
@@ -49,11 +44,11 @@ class UncertainLoop(NamedTuple):
     channels: AnyArray
     gains: AnyArray
     offsets: AnyArray
-    disturbance: AnyArray
-    limits: AnyArray
-    starts: AnyArray
-    stage: AnyArray
-    mirrors: Array
+    disturbance: AnyArray  # b, (n, d)
+    limits: AnyArray  # rows f, (l, n): |f z| <= 1
+    starts: AnyArray  # desired starts, (s, n), each along one axis
+    stage: AnyArray  # stage cost, (n, n)
+    mirrors: Array  # signs of states, (g, n), that map the polytope to itself
 
     def blocks(self) -> list[list[int]]:
         """Return groups of states to couple in P, by mirror images."""

@@ -74,15 +74,13 @@ class Restarted(NamedTuple):
 
     Attributes:
         unbroken_m, off_m: Distance to the reference afterwards, (n,), without and with it.
-        same: Both flights are identical, bit for bit.
-        is_plain: The law's memory was kept.
     """
 
     unbroken_m: Array
     off_m: Array
     tilt_deg: float
-    same: bool
-    is_plain: bool
+    same: bool  # both flights are identical, bit for bit
+    is_plain: bool  # the law's memory was kept
 
 
 _BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5

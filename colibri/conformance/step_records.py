@@ -32,22 +32,16 @@ _JUMP_M, _JUMP_RAD = 5.0, 4.0
 
 
 class FlownStep(NamedTuple):
-    """One step of a control law.
-
-    Attributes:
-        memory: The object itself; `pickled` before the step, if possible.
-        references: A copy; `changed` if the law has modified its own.
-        decision: The object itself; `rotor_speeds` is a copy.
-    """
+    """One step of a control law."""
 
     method: str
-    memory: Any
+    memory: Any  # the object itself; `pickled` before the step, if possible
     pickled: bytes | None
     time_us: int
     state: VehicleState
-    references: Horizon
+    references: Horizon  # a copy; `changed` if the law has modified its own
     changed: bool
-    decision: Decision
+    decision: Decision  # the object itself; `rotor_speeds` is a copy
     rotor_speeds: Array
     took_s: float
 

@@ -14,18 +14,13 @@ class NoEffectWarning(UserWarning):
 
 
 class FlownOptions(NamedTuple):
-    """Options, and the vehicles of autopilot and plant.
-
-    Attributes:
-        name: Name or file of the plant's vehicle.
-        whole: The plant's vehicle with the parts that `without` leaves out, if known.
-    """
+    """Options, and the vehicles of autopilot and plant."""
 
     spec: Any
-    name: str
+    name: str  # name or file of the plant's vehicle
     vehicle: Vehicle
     plant_vehicle: Vehicle
-    whole: Vehicle | None
+    whole: Vehicle | None  # the plant's vehicle with the parts that `without` leaves out, if known
 
     @property
     def has_drag(self) -> bool:

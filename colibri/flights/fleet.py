@@ -139,20 +139,14 @@ _MAX_DEATHS, _LOOP_S = 3, 60.0
 
 @dataclass(slots=True, eq=False)
 class Member:
-    """One vehicle of the fleet.
+    """One vehicle of the fleet."""
 
-    Attributes:
-        instance: Ports and system id follow from it.
-        links: URLs that its autopilot serves; once open, with actual ports.
-        boot_unix_us: Start of its plant, which dates telemetry logs.
-    """
-
-    instance: int
+    instance: int  # ports and system id follow from it
     east_m: float
-    links: list[str]
+    links: list[str]  # URLs that its autopilot serves; once open, with actual ports
     children: list[Child] = field(default_factory=list)
     plant_url: str = ""
-    boot_unix_us: int = 0
+    boot_unix_us: int = 0  # start of its plant, which dates telemetry logs
     deaths_s: list[float] = field(default_factory=list)
 
 

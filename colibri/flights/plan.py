@@ -51,35 +51,24 @@ _ALIKE_DEG, _SECTORS = 45.0, 8
 
 
 class Contents(NamedTuple):
-    """The contents of the files named in a specification.
-
-    Attributes:
-        plant_vehicle: Without the parts left out.
-        track_file: Text of the track's file, if it has one.
-        whole: The plant's vehicle with the parts left out; `None` in a recorded flight.
-    """
+    """The contents of the files named in a specification."""
 
     profile: Profile
     vehicle: Vehicle
-    plant_vehicle: Vehicle
-    track_file: str | None
-    whole: Vehicle | None = None
+    plant_vehicle: Vehicle  # without the parts left out
+    track_file: str | None  # text of the track's file, if it has one
+    whole: Vehicle | None = None  # the plant's vehicle with the parts left out; `None` in a recorded flight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPlan:
-    """A flight that can begin.
-
-    Attributes:
-        track: Track to fly, adapted to the vehicle's limits.
-        track_note: Changes of the track, or the limit that it exceeds; else empty.
-    """
+    """A flight that can begin."""
 
     spec: FlightSpec
     contents: Contents
     start: Start
-    track: Track
-    track_note: str
+    track: Track  # track to fly, adapted to the vehicle's limits
+    track_note: str  # changes of the track, or the limit that it exceeds; else empty
 
     @classmethod
     def of(cls, spec: FlightSpec, contents: Contents | None = None) -> "FlightPlan":

@@ -34,22 +34,16 @@ class ProvenanceError(Error):
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The inputs of a flight.
-
-    Attributes:
-        profile: With the law, solver and delay of the options.
-        plant_vehicle: Without the parts left out.
-        sha256: Hash of each of these without names, and of all of them as `all`.
-    """
+    """The inputs of a flight."""
 
     colibri: str
     spec: dict[str, Any]
-    profile: Profile
+    profile: Profile  # with the law, solver and delay of the options
     law: Origin
     vehicle: Vehicle
-    plant_vehicle: Vehicle
+    plant_vehicle: Vehicle  # without the parts left out
     track_file: str | None
-    sha256: dict[str, str]
+    sha256: dict[str, str]  # hash of each of these without names, and of all of them as `all`
 
 
 def provenance_of(plan: FlightPlan) -> Provenance:

@@ -214,21 +214,18 @@ class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_onl
     """The tables of a tuning's file; also the keywords of `colibri.tune`.
 
     Attributes:
-        check_seeds: Seeds to compare the best profile with the original by.
-        trials: Number of trials, including the original profile.
         prune_after: Seeds between decisions to end a trial clearly worse than the best; 0 never. Default a quarter of
             the seeds, at least three.
-        tune: Numbers of the profile and their ranges.
         objectives: Metrics to minimize, and how to pool them over a trial's flights.
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = (*FlightTables.FACTORS, "tune")
     name: str = "tuning"
     seeds: Any = "0-7"
-    check_seeds: Any = None
-    trials: int = 50
+    check_seeds: Any = None  # seeds to compare the best profile with the original by
+    trials: int = 50  # number of trials, including the original profile
     prune_after: int | None = None
-    tune: dict[str, Any] = msgspec.field(default_factory=dict)
+    tune: dict[str, Any] = msgspec.field(default_factory=dict)  # numbers of the profile and their ranges
     objectives: dict[str, Any] = msgspec.field(default_factory=dict)
 
 

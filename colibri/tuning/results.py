@@ -37,7 +37,6 @@ class Compared(NamedTuple):
     """One number before and after, for one combination or `all`.
 
     Attributes:
-        change: Relative to `before`; absolute for a share, or if a resampled `before` is zero.
         low, high: Bounds at 95 % confidence: bootstrap over seeds, in pairs.
     """
 
@@ -46,7 +45,7 @@ class Compared(NamedTuple):
     seeds: int
     before: float
     after: float
-    change: float
+    change: float  # relative to `before`; absolute for a share, or if a resampled `before` is zero
     low: float
     high: float
     is_relative: bool

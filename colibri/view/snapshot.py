@@ -23,13 +23,11 @@ class VehicleShape(NamedTuple):
 
     Attributes:
         rotors_m: x forward, y left of each rotor.
-        spins: 1.0 counter-clockwise from above, -1.0 clockwise.
-        foot_m: Height of the rotors above the feet.
     """
 
     rotors_m: tuple[tuple[float, float], ...] = ((0.17, -0.17), (-0.17, 0.17), (0.17, 0.17), (-0.17, -0.17))
-    spins: PerRotor = (1.0, 1.0, -1.0, -1.0)
-    foot_m: float = 0.1
+    spins: PerRotor = (1.0, 1.0, -1.0, -1.0)  # 1.0 counter-clockwise from above, -1.0 clockwise
+    foot_m: float = 0.1  # height of the rotors above the feet
 
     @classmethod
     def of(cls, rotors: int) -> "VehicleShape":
@@ -50,28 +48,19 @@ class VehicleShape(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """A vehicle at an instant; unknown values are nan or empty.
-
-    Attributes:
-        attitude: Unit quaternion, FLU to ENU.
-        rotors: Fractions of the largest speed.
-        trail: Recent positions, (n, 3), the newest last.
-        horizon: Predicted positions, (k, 3).
-        estimate_enu_m: Estimated position, if `position_enu_m` is the true one.
-        sigma_m: Its standard deviations, east, north, up.
-    """
+    """A vehicle at an instant; unknown values are nan or empty."""
 
     time_s: float
     position_enu_m: Vector
-    attitude: Quaternion
+    attitude: Quaternion  # unit quaternion, FLU to ENU
     velocity_enu_m_s: Vector = NOWHERE
-    rotors: PerRotor = UNKNOWN_ROTORS
+    rotors: PerRotor = UNKNOWN_ROTORS  # fractions of the largest speed
     reference_enu_m: Vector = NOWHERE
-    trail: Array = field(default_factory=lambda: NO_POINTS)
-    horizon: Array = field(default_factory=lambda: NO_POINTS)
+    trail: Array = field(default_factory=lambda: NO_POINTS)  # recent positions, (n, 3), the newest last
+    horizon: Array = field(default_factory=lambda: NO_POINTS)  # predicted positions, (k, 3)
     wind_enu_m_s: Vector = NOWHERE
-    estimate_enu_m: Vector = NOWHERE
-    sigma_m: Vector = NOWHERE
+    estimate_enu_m: Vector = NOWHERE  # estimated position, if `position_enu_m` is the true one
+    sigma_m: Vector = NOWHERE  # its standard deviations, east, north, up
     mode: str = ""
     armed: bool | None = None
     battery: str = ""
@@ -107,20 +96,13 @@ class Surroundings:
 
 
 class Chart(NamedTuple):
-    """Some series over the same times.
+    """Some series over the same times."""
 
-    Attributes:
-        title: Quantity and unit; charts of several flights are merged by it.
-        names: Of the series; a limit is in parentheses.
-        values: (series, n).
-        headline: What to show of each of several flights, (n,).
-    """
-
-    title: str
-    names: tuple[str, ...]
+    title: str  # quantity and unit; charts of several flights are merged by it
+    names: tuple[str, ...]  # of the series; a limit is in parentheses
     times_s: Array
-    values: Array
-    headline: Array
+    values: Array  # (series, n)
+    headline: Array  # what to show of each of several flights, (n,)
 
 
 class Source(Protocol):

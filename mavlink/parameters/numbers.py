@@ -12,12 +12,7 @@ NumberPath: TypeAlias = tuple[str | int, ...]
 
 
 class Number(NamedTuple):
-    """A parameter for the number at `path`, which is `scale` times its value.
-
-    Attributes:
-        kind: Integer of 8 (b), 16 (h) or 32 (i) bits, or float (f); empty: by the default.
-        values: Valid values with meanings, if not all; in a file `0=Off|1=On`.
-    """
+    """A parameter for the number at `path`, which is `scale` times its value."""
 
     name: str
     path: NumberPath = ()
@@ -28,10 +23,10 @@ class Number(NamedTuple):
     scale: float = 1.0
     decimals: int = 3
     default: Value = 0
-    kind: str = ""
+    kind: str = ""  # integer of 8 (b), 16 (h) or 32 (i) bits, or float (f); empty: by the default
     group: str = ""
     details: str = ""
-    values: tuple[tuple[int, str], ...] = ()
+    values: tuple[tuple[int, str], ...] = ()  # valid values with meanings, if not all; in a file `0=Off|1=On`
     read_only: bool = False
 
     def parameter(self, default: Value, group: str = "", details: str = "", wire: int = 0) -> Parameter:

@@ -174,19 +174,13 @@ F = TypeVar("F", bound=FlightFacts)
 
 
 class Rule(NamedTuple, Generic[F]):
-    """A row of a table.
-
-    Attributes:
-        words: What is wrong; of a check with advice.
-        required: Whether a broken check prevents the flight.
-        blind: Whether only the mode may be commanded after a limit.
-    """
+    """A row of a table."""
 
     name: str
     broken: Callable[[F], bool]
-    words: Callable[[F], str]
-    required: bool = True
-    blind: bool = False
+    words: Callable[[F], str]  # what is wrong; of a check with advice
+    required: bool = True  # whether a broken check prevents the flight
+    blind: bool = False  # whether only the mode may be commanded after a limit
 
 
 def _clock_advice(now: CheckFacts) -> str:
