@@ -17,13 +17,14 @@ class Home:
     def __init__(self, origin: Geodetic) -> None:
         self.origin = origin
         self.position_enu_m = _ORIGIN
-        self.yaw_rad = 0.0
+        self.yaw_rad = self.armed_yaw_rad = 0.0
         self.chosen = False
 
     def move(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
         self.position_enu_m, self.yaw_rad, self.chosen = position_enu_m, yaw_rad, chosen
 
     def propose(self, position_enu_m: Vector, yaw_rad: float) -> None:
+        self.armed_yaw_rad = yaw_rad
         if not self.chosen:
             self.position_enu_m, self.yaw_rad = position_enu_m, yaw_rad
 

@@ -156,6 +156,7 @@ class Pilot:
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.move(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
+        self.home.armed_yaw_rad = record.home_yaw_rad
         self.speed_m_s, self.lag_us = record.speed_m_s, record.lag_us
         ground = record.ground
         came_down = not seamless and not ground.standing and stands_at_first(vehicle, ground.height_m)
@@ -201,7 +202,7 @@ class Pilot:
             self.ground.standing,
             self.ground.height_m,
             blind=self.saving is Action.DESCEND or not position_known,
-            home_yaw_rad=self.home.yaw_rad,
+            home_yaw_rad=self.home.armed_yaw_rad,
         )
 
     def warn(self, text: str) -> None:

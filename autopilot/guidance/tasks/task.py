@@ -36,7 +36,7 @@ class TaskContext(NamedTuple):
     standing: bool = False
     ground_m: float = 0.0  # z of ENU at the last standing position
     blind: bool = False  # whether the position is unusable
-    home_yaw_rad: float = 0.0
+    home_yaw_rad: float = 0.0  # heading at arming
 
     @property
     def yaw_rad(self) -> float:
