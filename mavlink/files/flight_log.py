@@ -1,8 +1,10 @@
 """Numbered logs of flights, from arming to disarming."""
 
+from contextlib import suppress
+from errno import ENOSPC
 from typing import NamedTuple
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names
+from colibri.mavlink.files.tree import Entry, Files, Names, entries_in
 
 KEPT = 50
 WRITE_BYTES = 4096
@@ -36,7 +38,7 @@ class FlightLog:
         self._names = names
         self._kept = kept
         self.name: str | None = None  # of the open file
-        self.refusal: FileRefusal | None = None  # of the last write, which ended the log
+        self.refusal: int | None = None  # errno of the last write, which ended the log
         self._armed = False
         self._waiting = bytearray()
         self._size = 0
@@ -65,13 +67,16 @@ class FlightLog:
     def _begin(self, now_us: int) -> None:
         logs = self._logs()
         for log in logs[: max(len(logs) - self._kept + 1, 0)]:
-            self._files.remove((*self._folder, log.name))
+            with suppress(OSError):
+                self._files.remove((*self._folder, log.name))
         name = self._names.name(self._names.number(logs[-1].name) + 1 if logs else 1)
-        place = (*self._folder, name)
-        self.refusal = self._files.create(place)
-        if self.refusal is FileRefusal.NOT_FOUND and self._folder:  # a ground station removed it
-            self.refusal = self._files.make_folder(self._folder) or self._files.create(place)
-        self.name = name if self.refusal is None else None
+        self.name, self.refusal = name, None
+        try:
+            with suppress(FileExistsError):  # unless a ground station removed it
+                self._files.make_folder(self._folder)
+            self._files.create((*self._folder, name))
+        except OSError as error:
+            self.name, self.refusal = None, error.errno
         self._size = 0
         self._waiting.clear()
         self._write_at_us = now_us + WRITE_EVERY_US
@@ -81,20 +86,23 @@ class FlightLog:
         self._waiting.clear()
         if self.name is None:
             return
-        place = (*self._folder, self.name)
-        refusal = self._files.write(place, self._size, data)
-        for log in self._logs()[:-1] if refusal is FileRefusal.NO_SPACE else ():
-            self._files.remove((*self._folder, log.name))
-            refusal = self._files.write(place, self._size, data)
-            if refusal is not FileRefusal.NO_SPACE:
-                break
+        try:
+            self._append((*self._folder, self.name), data)
+        except OSError as error:
+            self.name, self.refusal = None, error.errno
         self._size += len(data)
-        if refusal is not None:
-            self.refusal = refusal
-            self.name = None
+
+    def _append(self, place: Names, data: bytes) -> None:
+        """Write at the end of a log; the oldest others give their space."""
+        try:
+            self._files.write(place, self._size, data)
+        except OSError as error:
+            logs = self._logs()
+            if error.errno != ENOSPC or len(logs) < 2:
+                raise
+            self._files.remove((*self._folder, logs[0].name))
+            self._append(place, data)
 
     def _logs(self) -> list[Entry]:
-        found = self._files.list(self._folder)
-        entries = [] if isinstance(found, FileRefusal) else found
-        number = self._names.number
+        entries, number = entries_in(self._files, self._folder), self._names.number
         return sorted((entry for entry in entries if number(entry.name)), key=lambda entry: number(entry.name))

@@ -2,51 +2,18 @@
 
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from errno import ELOOP, ENAMETOOLONG, EPERM, EROFS
-from functools import partial, wraps
+from errno import EACCES, EEXIST, EINVAL, EISDIR, ENOENT, ENOSPC
+from functools import partial
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Names, OpenFile, Quota, can_be_new
+from colibri.mavlink.files.tree import Entry, Names, OpenFile, Quota, can_be_new, refused
 
 DEFAULT_QUOTA = Quota(64 << 20, 1000)
 
 _SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK  # follow no link; do not block on a pipe
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
-
-_REFUSALS = {
-    **{refusal.value: refusal for refusal in FileRefusal},
-    **dict.fromkeys((ELOOP, EPERM, EROFS), FileRefusal.PROTECTED),
-    ENAMETOOLONG: FileRefusal.BAD_NAME,
-}
-_Arguments = ParamSpec("_Arguments")
-_Result = TypeVar("_Result")
-
-
-class _RefusedError(Exception):
-    def __init__(self, refusal: FileRefusal) -> None:
-        super().__init__(refusal.value)
-        self.refusal = refusal
-
-
-def _refusing(
-    method: Callable[Concatenate["Folder", _Arguments], _Result],
-) -> Callable[Concatenate["Folder", _Arguments], _Result | FileRefusal]:
-
-    @wraps(method)
-    def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | FileRefusal:
-        try:
-            return method(self, *args, **kwargs)
-        except _RefusedError as error:
-            return error.refusal
-        except OSError as error:
-            return _REFUSALS.get(error.errno or 0, FileRefusal.FAILED)
-        except (ValueError, OverflowError):  # a NUL in a name, a name that is no text, an offset beyond the system's
-            return FileRefusal.BAD_NAME
-
-    return refusing
 
 
 class Folder:
@@ -61,17 +28,14 @@ class Folder:
     def close(self) -> None:
         os.close(self._root)
 
-    @_refusing
     def list(self, names: Names) -> list[Entry]:
         with self._open_folder(names) as folder, os.scandir(folder) as found:
             return sorted(entry for entry in map(_entry_of, found) if entry is not None)
 
-    @_refusing
     def open(self, names: Names) -> OpenFile:
         with self._open_file(names, os.O_RDONLY) as file:
             return OpenFile(os.fstat(file).st_size, partial(self._read, names))
 
-    @_refusing
     def create(self, names: Names) -> None:
         with self._open_parent(names) as (folder, name):
             if _kind(folder, name) is None:
@@ -81,56 +45,47 @@ class Folder:
                 return
         self._cut(names, 0)
 
-    @_refusing
     def write(self, names: Names, offset: int, data: bytes) -> None:
         with self._open_file(names, os.O_WRONLY) as file:
             more = max(offset + len(data) - os.fstat(file).st_size, 0) if data else 0
-            if self._size + more > self._quota.size:
-                raise _RefusedError(FileRefusal.NO_SPACE)
-            if os.pwrite(file, data, offset) != len(data):
-                raise _RefusedError(FileRefusal.NO_SPACE)
+            if self._size + more > self._quota.size or os.pwrite(file, data, offset) != len(data):
+                raise refused(ENOSPC)
             self._size += more
 
-    @_refusing
     def truncate(self, names: Names, size: int) -> None:
         self._cut(names, size)
 
-    @_refusing
     def remove(self, names: Names) -> None:
         with self._open_parent(names) as (folder, name):
             status = self._existing(folder, name)
             if stat.S_ISDIR(status.st_mode):
-                raise _RefusedError(FileRefusal.IS_FOLDER)
+                raise refused(EISDIR)
             os.unlink(name, dir_fd=folder)
             self._size -= status.st_size
             self._entries -= 1
 
-    @_refusing
     def rename(self, old: Names, new: Names) -> None:
         with self._open_parent(old) as (old_folder, old_name), self._open_parent(new) as (new_folder, new_name):
             self._existing(old_folder, old_name)
             if _kind(new_folder, new_name) is not None:
-                raise _RefusedError(FileRefusal.EXISTS)
+                raise refused(EEXIST)
             if not can_be_new(new_name):
-                raise _RefusedError(FileRefusal.BAD_NAME)
+                raise refused(EINVAL)
             os.rename(old_name, new_name, src_dir_fd=old_folder, dst_dir_fd=new_folder)
 
-    @_refusing
     def make_folder(self, names: Names) -> None:
         with self._open_parent(names) as (folder, name):
             if _kind(folder, name) is not None:
-                raise _RefusedError(FileRefusal.EXISTS)
+                raise refused(EEXIST)
             self._allow_new(name)
             os.mkdir(name, 0o755, dir_fd=folder)
             self._entries += 1
 
-    @_refusing
     def remove_folder(self, names: Names) -> None:
         with self._open_parent(names) as (folder, name):
             os.rmdir(name, dir_fd=folder)
             self._entries -= 1
 
-    @_refusing
     def _read(self, names: Names, offset: int, count: int) -> bytes:
         with self._open_file(names, os.O_RDONLY) as file:
             return os.pread(file, count, offset)
@@ -144,14 +99,14 @@ class Folder:
 
     def _allow_new(self, name: str) -> None:
         if not can_be_new(name):
-            raise _RefusedError(FileRefusal.BAD_NAME)
+            raise refused(EINVAL)
         if self._entries >= self._quota.entries:
-            raise _RefusedError(FileRefusal.NO_SPACE)
+            raise refused(ENOSPC)
 
     def _existing(self, folder: int, name: str) -> os.stat_result:
         status = os.stat(name, dir_fd=folder, follow_symlinks=False)
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
-            raise _RefusedError(FileRefusal.NOT_FOUND)
+            raise refused(ENOENT)
         return status
 
     @contextmanager
@@ -169,22 +124,22 @@ class Folder:
     @contextmanager
     def _open_parent(self, names: Names) -> Iterator[tuple[int, str]]:
         if not names:
-            raise _RefusedError(FileRefusal.PROTECTED)
+            raise refused(EACCES)
         with self._open_folder(names[:-1]) as folder:
             yield folder, _plain(names[-1])
 
     @contextmanager
     def _open_file(self, names: Names, how: int) -> Iterator[int]:
         if not names:
-            raise _RefusedError(FileRefusal.IS_FOLDER)
+            raise refused(EISDIR)
         with self._open_folder(names[:-1]) as folder:
             name = _plain(names[-1])
             if stat.S_ISDIR(self._existing(folder, name).st_mode):
-                raise _RefusedError(FileRefusal.IS_FOLDER)
+                raise refused(EISDIR)
             file = os.open(name, how | _SAFELY, dir_fd=folder)
         try:
             if not stat.S_ISREG(os.fstat(file).st_mode):
-                raise _RefusedError(FileRefusal.NOT_FOUND)
+                raise refused(ENOENT)
             yield file
         finally:
             os.close(file)
@@ -198,8 +153,8 @@ class Folder:
 
 
 def _plain(name: str) -> str:
-    if name in ("", ".", "..") or "/" in name:
-        raise _RefusedError(FileRefusal.NOT_FOUND)
+    if name in ("", ".", "..") or "/" in name or "\0" in name:
+        raise refused(ENOENT)
     return name
 
 

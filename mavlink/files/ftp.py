@@ -12,11 +12,10 @@ Choices where the specification leaves them, or clients deviate:
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
 from zlib import crc32
 
-from colibri.mavlink.files.ftp_wire import DATA_BYTES, SIZE, FtpError, Key, Nak, Opcode, Request, line_of
-from colibri.mavlink.files.tree import ENTRY_US, FileRefusal, Files, Names, OpenFile
+from colibri.mavlink.files.ftp_wire import DATA_BYTES, SIZE, FtpError, Key, NakError, Opcode, Request, line_of
+from colibri.mavlink.files.tree import ENTRY_US, Files, Names, OpenFile
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
@@ -35,8 +34,6 @@ MAX_BURST_PACKETS = 1000  # limit of packets to a client that has gone
 CHECKSUM_BYTES_A_POLL = 256 << 10
 
 _UINT32_MAX = 0xFFFFFFFF
-
-Outcome: TypeAlias = bytes | Nak | FileRefusal | None  # `None` if the answer follows later
 
 
 @dataclass(slots=True)
@@ -75,27 +72,29 @@ class Ftp:
         self._sessions: dict[Key, _Session] = {}
         self._bursts: dict[Key, _Burst] = {}
         self._checksums: dict[Key, _Checksum] = {}
-        self._remembered: dict[tuple[Peer, bytes], tuple[int, Send]] = {}
-        self._obey: dict[int, Callable[[Request], Outcome]] = {
+        self._remembered: dict[tuple[Peer, bytes], int] = {}  # changes made, and until when their requests are known
+        self._obey: dict[int, Callable[[Request], bytes | None]] = {
             Opcode.NONE: lambda _: b"",
             Opcode.TERMINATE: self._terminate,
             Opcode.RESET: self._reset,
-            Opcode.LIST: _on_path(self._list),
-            Opcode.LIST_WITH_TIME: _on_path(self._list),
-            Opcode.OPEN_TO_READ: _on_path(self._open_to_read),
             Opcode.READ: self._read,
             Opcode.BURST: self._begin_burst,
             Opcode.WRITE: self._write,
-            Opcode.CHECKSUM: _on_path(self._begin_checksum),
         }
-        self._change: dict[int, Callable[[Request], Outcome]] = {
-            Opcode.CREATE: _on_path(self._create),
-            Opcode.OPEN_TO_WRITE: _on_path(self._open_to_write),
-            Opcode.TRUNCATE: _on_path(self._truncate),
-            Opcode.REMOVE: _on_path(lambda _, names: files.remove(names) or b""),
-            Opcode.MAKE_FOLDER: _on_path(lambda _, names: files.make_folder(names) or b""),
-            Opcode.REMOVE_FOLDER: _on_path(lambda _, names: files.remove_folder(names) or b""),
-            Opcode.RENAME: _on_path(self._rename),
+        self._obey_on_path: dict[int, Callable[[Request, Names], bytes | None]] = {
+            Opcode.LIST: self._list,
+            Opcode.LIST_WITH_TIME: self._list,
+            Opcode.OPEN_TO_READ: self._open_to_read,
+            Opcode.CHECKSUM: self._begin_checksum,
+        }
+        self._change: dict[int, Callable[[Request, Names], None]] = {
+            Opcode.CREATE: self._create,
+            Opcode.OPEN_TO_WRITE: self._open_to_write,
+            Opcode.TRUNCATE: self._truncate,
+            Opcode.REMOVE: lambda _, names: files.remove(names),
+            Opcode.MAKE_FOLDER: lambda _, names: files.make_folder(names),
+            Opcode.REMOVE_FOLDER: lambda _, names: files.remove_folder(names),
+            Opcode.RENAME: self._rename,
         }
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
@@ -103,14 +102,11 @@ class Ftp:
         if request.opcode in (Opcode.ACK, Opcode.NAK):  # of another server, and to answer it would begin a quarrel
             return ()
         self._forget(now_us)
-        outcome: Outcome = Nak(FtpError.UNKNOWN_COMMAND)
-        if request.size > DATA_BYTES:
-            outcome = Nak(FtpError.INVALID_DATA_SIZE)
-        elif request.opcode in self._change:
-            return (self._changed(request),)
-        elif request.opcode in self._obey:
-            outcome = self._obey[request.opcode](request)
-        return () if outcome is None else (request.answer(outcome),)
+        try:
+            data = self._outcome(request)
+        except (OSError, NakError) as error:
+            return (request.refusal(error),)
+        return () if data is None else (request.answer(data),)
 
     def poll(self, _now_us: int) -> Iterable[Send]:
         if not self._bursts and not self._checksums:
@@ -118,37 +114,46 @@ class Ftp:
         sends: list[Send] = []
         for key in list(self._bursts)[:BURST_PACKETS_A_POLL]:
             burst = self._bursts.pop(key)  # to go to the end of the line
-            sends += self._packets(burst, max(BURST_PACKETS_A_POLL // (len(self._bursts) + 1), 1))
+            sends += _packets(burst, max(BURST_PACKETS_A_POLL // (len(self._bursts) + 1), 1))
             if burst.packets_left:
                 self._bursts[key] = burst
         for key in list(self._checksums)[:1]:
             checksum = self._checksums.pop(key)
-            outcome = _sum(checksum)
-            if outcome is None:
+            try:
+                data = _sum(checksum)
+            except OSError as error:
+                sends.append(checksum.request.refusal(error))
+                continue
+            if data is None:
                 self._checksums[key] = checksum
             else:
-                sends.append(checksum.request.answer(outcome))
+                sends.append(checksum.request.answer(data))
         return sends
 
-    def _changed(self, request: Request) -> Send:
-        """Make a change once, however often the identical request is repeated."""
+    def _outcome(self, request: Request) -> bytes | None:
+        """Return the data of the answer; `None` if it follows later."""
+        opcode = request.opcode
+        if request.size > DATA_BYTES:
+            raise NakError(FtpError.INVALID_DATA_SIZE)
+        if opcode in self._obey:
+            return self._obey[opcode](request)
+        if opcode in self._obey_on_path:
+            return self._obey_on_path[opcode](request, request.path())
+        if opcode not in self._change:
+            raise NakError(FtpError.UNKNOWN_COMMAND)
         asked = (request.peer, request.payload)
-        if asked in self._remembered:
-            return self._remembered[asked][1]
-        outcome = self._change[request.opcode](request)
-        assert outcome is not None, "changes are made at once"
-        done = request.answer(outcome)
-        if isinstance(outcome, bytes):
+        if asked not in self._remembered:  # a change is made once, however often the identical request is repeated
+            self._change[opcode](request, request.path())
             if len(self._remembered) >= MAX_REMEMBERED:
                 del self._remembered[next(iter(self._remembered))]
-            self._remembered[asked] = (request.now_us + REMEMBERED_FOR_US, done)
-        return done
+            self._remembered[asked] = request.now_us + REMEMBERED_FOR_US
+        return b""
 
     def _forget(self, now_us: int) -> None:
         for key, session in list(self._sessions.items()):
             if now_us - session.used_us > SESSION_ENDS_AFTER_US:
                 self._close(key)
-        for asked, (until_us, _) in list(self._remembered.items()):
+        for asked, until_us in list(self._remembered.items()):
             if now_us > until_us:
                 del self._remembered[asked]
 
@@ -171,13 +176,11 @@ class Ftp:
                 self._close(key)
         return b""
 
-    def _list(self, request: Request, names: Names) -> Outcome:
+    def _list(self, request: Request, names: Names) -> bytes:
         found = self._files.list(names)
-        if isinstance(found, FileRefusal):
-            return found
         self._budget.spend(PATH_US + ENTRY_US * len(found))
         if request.offset >= len(found):
-            return Nak(FtpError.END_OF_FILE)
+            raise NakError(FtpError.END_OF_FILE)
         data = b""
         for entry in found[request.offset :]:
             line = line_of(entry, with_time=request.opcode == Opcode.LIST_WITH_TIME)
@@ -186,42 +189,39 @@ class Ftp:
             data += line
         return data
 
-    def _open_to_read(self, request: Request, names: Names) -> Outcome:
+    def _open_to_read(self, request: Request, names: Names) -> bytes:
         self._budget.spend(PATH_US)
         reading = self._files.open(names)
-        if isinstance(reading, FileRefusal):
-            return reading
-        refused = self._opened(request, names, reading)
-        return refused or SIZE.pack(min(reading.size, _UINT32_MAX))
+        self._open(request, names, reading)
+        return SIZE.pack(min(reading.size, _UINT32_MAX))
 
-    def _open_to_write(self, request: Request, names: Names) -> Outcome:
-        if self._files.open(names) is FileRefusal.NOT_FOUND:
-            return self._create(request, names)
-        # Nothing is written here, but so it is known whether it may be.
-        return self._files.write(names, 0, b"") or self._opened(request, names, None) or b""
+    def _open_to_write(self, request: Request, names: Names) -> None:
+        try:
+            self._files.write(names, 0, b"")  # nothing is written here, but so it is known whether it may be
+        except FileNotFoundError:
+            self._create(request, names)
+        else:
+            self._open(request, names, None)
 
-    def _create(self, request: Request, names: Names) -> Outcome:
-        return (
-            self._no_session(request, names, None)
-            or self._files.create(names)
-            or self._opened(request, names, None)
-            or b""
-        )
+    def _create(self, request: Request, names: Names) -> None:
+        self._need_session(request, names, None)
+        self._files.create(names)
+        self._open(request, names, None)
 
-    def _opened(self, request: Request, names: Names, reading: OpenFile | None) -> Nak | None:
-        refused = self._no_session(request, names, reading)
-        if refused is None:
-            self._close(request.key)
-            self._sessions[request.key] = _Session(names, reading, request.now_us)
-        return refused
+    def _open(self, request: Request, names: Names, reading: OpenFile | None) -> None:
+        self._need_session(request, names, reading)
+        self._close(request.key)
+        self._sessions[request.key] = _Session(names, reading, request.now_us)
 
-    def _no_session(self, request: Request, names: Names, reading: OpenFile | None) -> Nak | None:
+    def _need_session(self, request: Request, names: Names, reading: OpenFile | None) -> None:
         session = self._sessions.get(request.key)
-        if session is not None:
+        if session is None:
+            free = self._has_room(request, self._sessions)
+        else:
             again = session.names == names and (session.reading is None) == (reading is None)
-            idle_us = request.now_us - session.used_us
-            return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(FtpError.NO_SESSIONS)
-        return None if self._has_room(request, self._sessions) else Nak(FtpError.NO_SESSIONS)
+            free = again or request.now_us - session.used_us >= TAKEN_OVER_AFTER_US
+        if not free:
+            raise NakError(FtpError.NO_SESSIONS)
 
     def _has_room(self, request: Request, taken: dict[Key, _Session] | dict[Key, _Checksum]) -> bool:
         of_channels = Counter(peer.channel for peer, _ in taken)
@@ -237,105 +237,97 @@ class Ftp:
         self._checksums.pop(victim, None)
         return True
 
-    def _used(self, request: Request) -> _Session | None:
+    def _used(self, request: Request) -> _Session:
         session = self._sessions.get(request.key)
-        if session is not None:
-            session.used_us = request.now_us
+        if session is None:
+            raise NakError(FtpError.INVALID_SESSION)
+        session.used_us = request.now_us
         return session
 
-    def _read(self, request: Request) -> Outcome:
+    def _reading(self, request: Request) -> OpenFile:
+        reading = self._used(request).reading
+        if reading is None:
+            raise NakError(FtpError.INVALID_SESSION)
+        return reading
+
+    def _read(self, request: Request) -> bytes:
         """Read part of a file; a burst continues meanwhile."""
-        session = self._used(request)
-        if session is None or session.reading is None:
-            return Nak(FtpError.INVALID_SESSION)
-        count = min(request.size or DATA_BYTES, session.reading.size - request.offset)
-        if count <= 0:
-            return Nak(FtpError.END_OF_FILE)
-        return session.reading.read(request.offset, count) or Nak(FtpError.END_OF_FILE)
+        reading = self._reading(request)
+        count = min(request.size or DATA_BYTES, reading.size - request.offset)
+        return _some(reading, request.offset, count)
 
-    def _begin_burst(self, request: Request) -> Outcome:
-        session = self._used(request)
-        if session is None or session.reading is None:
-            return Nak(FtpError.INVALID_SESSION)
+    def _begin_burst(self, request: Request) -> None:
+        reading = self._reading(request)
         self._bursts.pop(request.key, None)
-        if request.offset >= session.reading.size:
-            return Nak(FtpError.END_OF_FILE)
-        self._bursts[request.key] = _Burst(request, session.reading)
-        return None
+        if request.offset >= reading.size:
+            raise NakError(FtpError.END_OF_FILE)
+        self._bursts[request.key] = _Burst(request, reading)
 
-    def _packets(self, burst: _Burst, maximum: int) -> Iterator[Send]:
-        size = burst.request.size or DATA_BYTES
-        wanted = min(maximum * size, burst.reading.size - burst.request.offset)
-        data = burst.reading.read(burst.request.offset, wanted)
-        if isinstance(data, FileRefusal) or not data:  # removed, or cut, since it was opened
-            burst.packets_left = 0
-            yield burst.request.answer(data or Nak(FtpError.END_OF_FILE))
-            return
-        for start in range(0, len(data), size):
-            request, part = burst.request, data[start : start + size]
-            end = request.offset + len(part)
-            at_end = end >= burst.reading.size or len(part) < size
-            burst.packets_left = 0 if at_end else burst.packets_left - 1
-            yield request.answer(part, last=burst.packets_left == 0)
-            burst.request = request._replace(sequence=request.sequence + 1, offset=end)
-            if burst.packets_left == 0:
-                return
-
-    def _write(self, request: Request) -> Outcome:
+    def _write(self, request: Request) -> bytes:
         session = self._used(request)
-        if session is None:
-            return Nak(FtpError.INVALID_SESSION)
         if session.reading is not None:
-            return Nak(FtpError.PROTECTED)
-        return self._files.write(session.names, request.offset, request.data) or b""
+            raise NakError(FtpError.PROTECTED)
+        self._files.write(session.names, request.offset, request.data)
+        return b""
 
-    def _truncate(self, request: Request, names: Names) -> Outcome:
-        reading = self._files.open(names)
-        if isinstance(reading, FileRefusal):
-            return reading
-        if request.offset > reading.size:
-            return Nak(FtpError.END_OF_FILE)
-        return self._files.truncate(names, request.offset) or b""
+    def _truncate(self, request: Request, names: Names) -> None:
+        if request.offset > self._files.open(names).size:
+            raise NakError(FtpError.END_OF_FILE)
+        self._files.truncate(names, request.offset)
 
-    def _rename(self, request: Request, old: Names) -> Outcome:
-        _, new, *_ = (*request.paths(), ())
-        if isinstance(new, FileRefusal):
-            return new
+    def _rename(self, request: Request, old: Names) -> None:
+        new = request.path(1)
         if not new:
-            return Nak(FtpError.INVALID_DATA_SIZE)
-        return self._files.rename(old, new) or b""
+            raise NakError(FtpError.INVALID_DATA_SIZE)
+        self._files.rename(old, new)
 
-    def _begin_checksum(self, request: Request, names: Names) -> Outcome:
+    def _begin_checksum(self, request: Request, names: Names) -> bytes | None:
         running = self._checksums.get(request.key)
         if running is not None and running.names == names:
             running.request = request  # the client lost patience and asks again
             return None
         reading = self._files.open(names)
-        if isinstance(reading, FileRefusal):
-            return reading
         if not self._has_room(request, self._checksums):
-            return Nak(FtpError.NO_SESSIONS)
+            raise NakError(FtpError.NO_SESSIONS)
         checksum = _Checksum(request, names, reading, request.now_us)
-        outcome = _sum(checksum)
-        if outcome is None:
+        data = _sum(checksum)
+        if data is None:
             self._checksums[request.key] = checksum
-        return outcome
+        return data
 
 
-def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], Outcome]:
+def _some(reading: OpenFile, offset: int, count: int) -> bytes:
+    """Return at most `count` bytes of a file, and at least one."""
+    data = reading.read(offset, count) if count > 0 else b""
+    if not data:
+        raise NakError(FtpError.END_OF_FILE)
+    return data
 
-    def obey_request(request: Request) -> Outcome:
-        names = request.paths()[0]
-        return names if isinstance(names, FileRefusal) else obey(request, names)
 
-    return obey_request
+def _packets(burst: _Burst, maximum: int) -> Iterator[Send]:
+    size = burst.request.size or DATA_BYTES
+    wanted = min(maximum * size, burst.reading.size - burst.request.offset)
+    try:
+        data = _some(burst.reading, burst.request.offset, wanted)
+    except (OSError, NakError) as error:  # the file was removed, or cut, since it was opened
+        burst.packets_left = 0
+        yield burst.request.refusal(error)
+        return
+    for start in range(0, len(data), size):
+        request, part = burst.request, data[start : start + size]
+        end = request.offset + len(part)
+        at_end = end >= burst.reading.size or len(part) < size
+        burst.packets_left = 0 if at_end else burst.packets_left - 1
+        yield request.answer(part, last=burst.packets_left == 0)
+        burst.request = request._replace(sequence=request.sequence + 1, offset=end)
+        if burst.packets_left == 0:
+            return
 
 
-def _sum(checksum: _Checksum) -> bytes | FileRefusal | None:
+def _sum(checksum: _Checksum) -> bytes | None:
+    """Continue a checksum; return it when it is complete."""
     reading = checksum.reading
     data = reading.read(checksum.done, min(CHECKSUM_BYTES_A_POLL, reading.size - checksum.done))
-    if isinstance(data, FileRefusal):
-        return data
     checksum.register = crc32(data, checksum.register)
     checksum.done += len(data)
     if data and checksum.done < reading.size:

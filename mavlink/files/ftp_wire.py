@@ -1,10 +1,11 @@
 """Wire format of the file transfer protocol: https://mavlink.io/en/services/ftp.html."""
 
 from enum import IntEnum
+from errno import EACCES, EEXIST, EIO, ELOOP, ENOENT, EPERM, EROFS
 from struct import Struct
 from typing import NamedTuple, TypeAlias
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Names, names_of
+from colibri.mavlink.files.tree import Entry, Names, names_of, refused
 from colibri.mavlink.node.service import Peer, Send, to
 
 PAYLOAD_BYTES = 251
@@ -48,7 +49,18 @@ class FtpError(IntEnum):
 SIZE = Struct("<I")  # a file's size, or its checksum, in an answer
 _HEADER = Struct("<HBBBBBxI")
 
+_ERRORS = {
+    ENOENT: FtpError.NOT_FOUND,
+    EEXIST: FtpError.EXISTS,
+    **dict.fromkeys((EACCES, ELOOP, EPERM, EROFS), FtpError.PROTECTED),
+}
+"""All other errors of files are FAIL_ERRNO."""
+
 Key: TypeAlias = tuple[Peer, int]  # a session: client and number
+
+
+class NakError(Exception):
+    """A refused request; `args` has its FtpError, and the errno with FAIL_ERRNO."""
 
 
 class Request(NamedTuple):
@@ -72,42 +84,25 @@ class Request(NamedTuple):
     def key(self) -> Key:
         return self.peer, self.session
 
-    def paths(self) -> list[Names | FileRefusal]:
-        return [_path_in(text) for text in self.data.split(b"\0")]
+    def path(self, number: int = 0) -> Names:
+        """Return a path in the data; () if it is missing."""
+        try:
+            return names_of((*self.data.split(b"\0"), b"")[number].decode())
+        except UnicodeDecodeError:
+            raise refused(ENOENT) from None
 
-    def answer(self, outcome: "bytes | Nak | FileRefusal", *, last: bool = False) -> Send:
-        opcode, peer = Opcode.ACK, self.peer
-        if isinstance(outcome, FileRefusal):
-            outcome = Nak(_ERRORS[outcome]) if outcome in _ERRORS else Nak(FtpError.FAIL_ERRNO, outcome.value)
-        if isinstance(outcome, Nak):
-            opcode = Opcode.NAK
-            outcome = bytes(outcome) if outcome.errno else bytes(outcome[:1])
-        sequence = (self.sequence + 1) % 0x10000
-        header = _HEADER.pack(sequence, self.session, opcode, len(outcome), self.opcode, last, self.offset)
-        payload = (header + outcome).ljust(PAYLOAD_BYTES, b"\0")
+    def answer(self, data: bytes, opcode: Opcode = Opcode.ACK, *, last: bool = False) -> Send:
+        sequence, peer = (self.sequence + 1) % 0x10000, self.peer
+        header = _HEADER.pack(sequence, self.session, opcode, len(data), self.opcode, last, self.offset)
+        payload = (header + data).ljust(PAYLOAD_BYTES, b"\0")
         return to(peer, "FILE_TRANSFER_PROTOCOL", 0, peer.system, peer.component, payload)
 
-
-def _path_in(text: bytes) -> Names | FileRefusal:
-    try:
-        return names_of(text.decode())
-    except UnicodeDecodeError:
-        return FileRefusal.NOT_FOUND
-
-
-class Nak(NamedTuple):
-    """A refusal; errno with FAIL_ERRNO."""
-
-    error: FtpError
-    errno: int = 0
-
-
-_ERRORS = {
-    FileRefusal.NOT_FOUND: FtpError.NOT_FOUND,
-    FileRefusal.EXISTS: FtpError.EXISTS,
-    FileRefusal.PROTECTED: FtpError.PROTECTED,
-}
-"""All other refusals are FAIL_ERRNO."""
+    def refusal(self, error: OSError | NakError) -> Send:
+        reason = error.args
+        if isinstance(error, OSError):
+            number = error.errno or EIO
+            reason = (_ERRORS[number],) if number in _ERRORS else (FtpError.FAIL_ERRNO, number & 0xFF)
+        return self.answer(bytes(reason), Opcode.NAK)
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:

@@ -2,9 +2,10 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
-from colibri.mavlink.files.tree import ENTRY_US, Entry, FileRefusal, Files, Names, OpenFile
+from colibri.mavlink.files.tree import ENTRY_US, Entry, Files, Names, OpenFile, entries_in
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send, first_to_go, to
 from colibri.mavlink.wire.dialect import Message
@@ -79,7 +80,8 @@ class Logs:
         if not self._transfers and not self._listings and not self._erasing:
             return IDLE
         for _ in range(min(len(self._erasing), ERASED_A_POLL)):
-            self._files.remove((*self._folder, self._erasing.popitem()[0]))
+            with suppress(OSError):
+                self._files.remove((*self._folder, self._erasing.popitem()[0]))
         sends: list[Send] = []
         share = MESSAGES_A_POLL // max(len(self._listings), 1)  # of at most `MAX_PEERS`
         for listing in list(self._listings.values()):
@@ -125,10 +127,10 @@ class Logs:
     def _transfer(self, peer: Peer, number: int, offset: int, count: int) -> Iterable[Send]:
         logs = self._shown.pop(peer) if peer in self._shown else self._look(peer)
         self._shown[peer] = logs  # last in line to be forgotten
-        place = number - self._first_id
-        known = 0 <= place < len(logs)
-        reading = self._files.open((*self._folder, logs[place].name)) if known else FileRefusal.NOT_FOUND
-        if isinstance(reading, FileRefusal) or offset >= reading.size or count == 0:
+        place, reading = number - self._first_id, None
+        with suppress(OSError):
+            reading = self._files.open((*self._folder, logs[place].name)) if 0 <= place < len(logs) else None
+        if reading is None or offset >= reading.size or count == 0:
             return (_block(peer, number, offset, b""),)  # "zero for end of log"
         transfer = _Transfer(peer, number, reading, offset, offset + count)
         # A client that asks for another log has turned away from the one before.
@@ -141,8 +143,7 @@ class Logs:
         return ()
 
     def _logs(self) -> list[Entry]:
-        found = self._files.list(self._folder)
-        entries = [] if isinstance(found, FileRefusal) else found
+        entries = entries_in(self._files, self._folder)
         self._budget.spend(ENTRY_US * len(entries))
         return [entry for entry in entries if not entry.is_folder and entry.name.endswith(self._suffix)]
 
@@ -161,9 +162,9 @@ class Logs:
 def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:
     """Yield the next blocks; an empty one marks the end after a full one."""
     wanted = min(maximum * BLOCK_BYTES, transfer.end - transfer.offset)
-    data = transfer.reading.read(transfer.offset, wanted)
-    if isinstance(data, FileRefusal):
-        data = b""
+    data = b""
+    with suppress(OSError):
+        data = transfer.reading.read(transfer.offset, wanted)
     for start in range(0, len(data), BLOCK_BYTES):
         yield _block(transfer.peer, transfer.id, transfer.offset + start, data[start : start + BLOCK_BYTES])
     transfer.offset += len(data)

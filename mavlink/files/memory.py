@@ -1,8 +1,9 @@
 """Files in memory, for a vehicle without a folder."""
 
+from errno import EACCES, EEXIST, EINVAL, EISDIR, ENOENT, ENOSPC, ENOTDIR, ENOTEMPTY
 from functools import partial
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Names, OpenFile, Quota, can_be_new
+from colibri.mavlink.files.tree import Entry, Names, OpenFile, Quota, can_be_new, refused
 
 DEFAULT_QUOTA = Quota(8 << 20, 1000)
 
@@ -10,108 +11,96 @@ DEFAULT_QUOTA = Quota(8 << 20, 1000)
 class MemoryFiles:
     def __init__(self, quota: Quota = DEFAULT_QUOTA) -> None:
         self._quota = quota
-        self._files: dict[Names, bytearray] = {}
-        self._folders: set[Names] = {()}
+        self._contents: dict[Names, bytearray | None] = {(): None}  # of files; None of folders
         self._size = 0
 
-    def list(self, names: Names) -> list[Entry] | FileRefusal:
-        if names not in self._folders:
-            return self._no_way(names) or (FileRefusal.NOT_A_FOLDER if names in self._files else FileRefusal.NOT_FOUND)
-        found = [Entry(path[-1], True) for path in self._folders if path and path[:-1] == names]
-        found += [Entry(path[-1], False, len(data)) for path, data in self._files.items() if path[:-1] == names]
-        return sorted(found)
+    def list(self, names: Names) -> list[Entry]:
+        if self._content(names) is not None:
+            raise refused(ENOTDIR)
+        below = [(path, data) for path, data in self._contents.items() if path and path[:-1] == names]
+        return sorted(Entry(path[-1], data is None, len(data or b"")) for path, data in below)
 
-    def open(self, names: Names) -> OpenFile | FileRefusal:
-        return self._no_file(names) or OpenFile(len(self._files[names]), partial(self._read, names))
+    def open(self, names: Names) -> OpenFile:
+        return OpenFile(len(self._file(names)), partial(self._read, names))
 
-    def create(self, names: Names) -> FileRefusal | None:
-        if names in self._files:
-            return self.truncate(names, 0)
-        refusal = self._no_room(names)
-        if refusal is None:
-            self._files[names] = bytearray()
-        return FileRefusal.IS_FOLDER if refusal is FileRefusal.EXISTS else refusal
+    def create(self, names: Names) -> None:
+        if names and names in self._contents:
+            self.truncate(names, 0)
+        else:
+            self._add(names, bytearray())
 
-    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
-        refusal = self._no_file(names)
-        if refusal is not None:
-            return refusal
-        file = self._files[names]
+    def write(self, names: Names, offset: int, data: bytes) -> None:
+        file = self._file(names)
         more = max(offset + len(data) - len(file), 0) if data else 0
         if self._size + more > self._quota.size:
-            return FileRefusal.NO_SPACE
+            raise refused(ENOSPC)
         self._size += more
         file.extend(bytes(more))
         file[offset : offset + len(data)] = data
-        return None
 
-    def truncate(self, names: Names, size: int) -> FileRefusal | None:
-        refusal = self._no_file(names)
-        if refusal is None:
-            self._size -= max(len(self._files[names]) - size, 0)
-            del self._files[names][size:]
-        return refusal
+    def truncate(self, names: Names, size: int) -> None:
+        file = self._file(names)
+        self._size -= max(len(file) - size, 0)
+        del file[size:]
 
-    def remove(self, names: Names) -> FileRefusal | None:
-        refusal = self._no_file(names) if names else FileRefusal.PROTECTED
-        if refusal is None:
-            self._size -= len(self._files.pop(names))
-        return refusal
-
-    def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        old_refusal = self._no_way(old) if old else FileRefusal.PROTECTED
-        refusal = old_refusal or (self._no_way(new) if new else FileRefusal.PROTECTED)
-        if refusal is None and old not in self._files and old not in self._folders:
-            refusal = FileRefusal.NOT_FOUND
-        refusal = refusal or self._no_place(new) or (FileRefusal.BAD_NAME if new[: len(old)] == old else None)
-        if refusal is None:
-            self._files = {_moved(path, old, new): data for path, data in self._files.items()}
-            self._folders = {_moved(path, old, new) for path in self._folders}
-        return refusal
-
-    def make_folder(self, names: Names) -> FileRefusal | None:
-        refusal = self._no_room(names)
-        if refusal is None:
-            self._folders.add(names)
-        return refusal
-
-    def remove_folder(self, names: Names) -> FileRefusal | None:
+    def remove(self, names: Names) -> None:
         if not names:
-            return FileRefusal.PROTECTED
-        found = self.list(names)
-        if isinstance(found, FileRefusal):
-            return found
-        if found:
-            return FileRefusal.NOT_EMPTY
-        self._folders.remove(names)
-        return None
+            raise refused(EACCES)
+        self._size -= len(self._file(names))
+        del self._contents[names]
 
-    def _read(self, names: Names, offset: int, count: int) -> bytes | FileRefusal:
-        return self._no_file(names) or bytes(self._files[names][offset : offset + count])
+    def rename(self, old: Names, new: Names) -> None:
+        self._look_in_parent(old)
+        self._look_in_parent(new)
+        self._content(old)
+        self._allow_new(new)
+        if new[: len(old)] == old:
+            raise refused(EINVAL)
+        self._contents = {_moved(path, old, new): data for path, data in self._contents.items()}
 
-    def _no_way(self, names: Names) -> FileRefusal | None:
-        for depth in range(1, len(names)):
-            if names[:depth] not in self._folders:
-                return FileRefusal.NOT_A_FOLDER if names[:depth] in self._files else FileRefusal.NOT_FOUND
-        return None
+    def make_folder(self, names: Names) -> None:
+        self._add(names, None)
 
-    def _no_file(self, names: Names) -> FileRefusal | None:
-        if names in self._files:
-            return None
-        if names in self._folders:
-            return FileRefusal.IS_FOLDER
-        return self._no_way(names) or FileRefusal.NOT_FOUND
-
-    def _no_place(self, names: Names) -> FileRefusal | None:
+    def remove_folder(self, names: Names) -> None:
         if not names:
-            return FileRefusal.PROTECTED
-        if names in self._files or names in self._folders:
-            return FileRefusal.EXISTS
-        return self._no_way(names) or (None if can_be_new(names[-1]) else FileRefusal.BAD_NAME)
+            raise refused(EACCES)
+        if self.list(names):
+            raise refused(ENOTEMPTY)
+        del self._contents[names]
 
-    def _no_room(self, names: Names) -> FileRefusal | None:
-        full = len(self._files) + len(self._folders) > self._quota.entries  # the root is no entry
-        return self._no_place(names) or (FileRefusal.NO_SPACE if full else None)
+    def _read(self, names: Names, offset: int, count: int) -> bytes:
+        return bytes(self._file(names)[offset : offset + count])
+
+    def _content(self, names: Names) -> bytearray | None:
+        if names in self._contents:
+            return self._contents[names]
+        parents = (names[:depth] for depth in range(1, len(names)))
+        raise refused(ENOTDIR if any(self._contents.get(parent) is not None for parent in parents) else ENOENT)
+
+    def _file(self, names: Names) -> bytearray:
+        content = self._content(names)
+        if content is None:
+            raise refused(EISDIR)
+        return content
+
+    def _look_in_parent(self, names: Names) -> None:
+        if not names:
+            raise refused(EACCES)
+        if self._content(names[:-1]) is not None:
+            raise refused(ENOTDIR)
+
+    def _allow_new(self, names: Names) -> None:
+        self._look_in_parent(names)
+        if names in self._contents:
+            raise refused(EEXIST)
+        if not can_be_new(names[-1]):
+            raise refused(EINVAL)
+
+    def _add(self, names: Names, content: bytearray | None) -> None:
+        self._allow_new(names)
+        if len(self._contents) > self._quota.entries:  # the root is no entry
+            raise refused(ENOSPC)
+        self._contents[names] = content
 
 
 def _moved(path: Names, old: Names, new: Names) -> Names:

@@ -1,8 +1,7 @@
-"""The vehicle's files as ground stations see them. Invalid input is refused; these classes never raise."""
+"""The vehicle's files as ground stations see them. Every refused operation raises `OSError` with its errno."""
 
 from collections.abc import Callable, Iterator, Mapping
-from enum import Enum
-from errno import EACCES, EEXIST, EINVAL, EIO, EISDIR, ENOENT, ENOSPC, ENOTDIR, ENOTEMPTY
+from errno import EACCES, EEXIST, EINVAL, EISDIR, ENOENT, ENOTDIR, errorcode
 from typing import NamedTuple, Protocol, TypeAlias
 
 Names: TypeAlias = tuple[str, ...]  # a path: the names of the parent folders and its own. The root is ().
@@ -10,20 +9,6 @@ Names: TypeAlias = tuple[str, ...]  # a path: the names of the parent folders an
 MAX_NAME_BYTES = 255
 MAX_DEPTH = 16
 ENTRY_US = 4.0  # work to list an entry of a folder
-
-
-class FileRefusal(Enum):
-    """Reason why an operation was refused, as an errno."""
-
-    NOT_FOUND = ENOENT
-    EXISTS = EEXIST
-    PROTECTED = EACCES
-    NO_SPACE = ENOSPC
-    IS_FOLDER = EISDIR
-    NOT_A_FOLDER = ENOTDIR
-    NOT_EMPTY = ENOTEMPTY
-    BAD_NAME = EINVAL
-    FAILED = EIO
 
 
 class Entry(NamedTuple):
@@ -35,7 +20,7 @@ class Entry(NamedTuple):
 
 class OpenFile(NamedTuple):
     size: int  # bytes when opened
-    read: Callable[[int, int], bytes | FileRefusal]  # (offset, count) -> bytes, fewer at the end
+    read: Callable[[int, int], bytes]  # (offset, count) -> bytes, fewer at the end
 
 
 class Quota(NamedTuple):
@@ -44,37 +29,49 @@ class Quota(NamedTuple):
 
 
 class Files(Protocol):
-    def list(self, names: Names) -> list[Entry] | FileRefusal: ...
+    def list(self, names: Names) -> list[Entry]: ...
 
-    def open(self, names: Names) -> OpenFile | FileRefusal: ...
+    def open(self, names: Names) -> OpenFile: ...
 
-    def create(self, names: Names) -> FileRefusal | None:
+    def create(self, names: Names) -> None:
         """Create an empty file, or empty an existing one."""
 
-    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
+    def write(self, names: Names, offset: int, data: bytes) -> None:
         """Write `data` into a file; a gap before it is filled with zeros."""
 
-    def truncate(self, names: Names, size: int) -> FileRefusal | None:
+    def truncate(self, names: Names, size: int) -> None:
         """Keep at most the first `size` bytes of a file."""
 
-    def remove(self, names: Names) -> FileRefusal | None: ...
+    def remove(self, names: Names) -> None: ...
 
-    def rename(self, old: Names, new: Names) -> FileRefusal | None:
+    def rename(self, old: Names, new: Names) -> None:
         """Move a file or folder; `new` must not exist."""
 
-    def make_folder(self, names: Names) -> FileRefusal | None: ...
+    def make_folder(self, names: Names) -> None: ...
 
-    def remove_folder(self, names: Names) -> FileRefusal | None: ...
+    def remove_folder(self, names: Names) -> None: ...
 
 
-def names_of(path: str) -> Names | FileRefusal:
+def refused(number: int) -> OSError:
+    return OSError(number, errorcode[number])
+
+
+def names_of(path: str) -> Names:
     """Return the names in a path; ".." is refused."""
     names = tuple(name for name in path.split("/") if name not in ("", "."))
     if ".." in names or "\0" in path:
-        return FileRefusal.NOT_FOUND
+        raise refused(ENOENT)
     if len(names) > MAX_DEPTH or not all(map(_fits, names)):
-        return FileRefusal.BAD_NAME
+        raise refused(EINVAL)
     return names
+
+
+def entries_in(files: Files, folder: Names) -> list[Entry]:
+    """Return the entries of a folder; none if it cannot be listed."""
+    try:
+        return files.list(folder)
+    except OSError:
+        return []
 
 
 def can_be_new(name: str) -> bool:
@@ -110,66 +107,63 @@ class Tree:
         fixed = (*self._mounts, *self._generated, *self._aliases)
         self._folders = {names[:depth] for names in fixed for depth in range(1, len(names))}
 
-    def list(self, names: Names) -> list[Entry] | FileRefusal:
+    def list(self, names: Names) -> list[Entry]:
         if names in self._generated:
-            return FileRefusal.NOT_A_FOLDER
+            raise refused(ENOTDIR)
         files, rest = self._at(names)
-        found = files.list(rest)
-        if isinstance(found, FileRefusal):
-            if names not in self._folders:
-                return found
-            found = []
+        found = entries_in(files, rest) if names in self._folders else files.list(rest)
         entries = {entry.name: entry for entry in found}
         entries |= {entry.name: entry for entry in self._fixed_in(names)}
         return [entries[name] for name in sorted(entries)]
 
-    def open(self, names: Names) -> OpenFile | FileRefusal:
+    def open(self, names: Names) -> OpenFile:
         if names:
             name, _, query = names[-1].partition("?")
             generator = self._generated.get((*names[:-1], name))
             if generator is not None:
                 return reading_of(generator(query))
         if names in self._folders:
-            return FileRefusal.IS_FOLDER
+            raise refused(EISDIR)
         files, rest = self._at(names)
         return files.open(rest)
 
-    def create(self, names: Names) -> FileRefusal | None:
-        return self._change(names, lambda files, rest: files.create(rest))
+    def create(self, names: Names) -> None:
+        files, rest = self._loose(names)
+        files.create(rest)
 
-    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
-        return self._change(names, lambda files, rest: files.write(rest, offset, data))
+    def write(self, names: Names, offset: int, data: bytes) -> None:
+        files, rest = self._loose(names)
+        files.write(rest, offset, data)
 
-    def truncate(self, names: Names, size: int) -> FileRefusal | None:
-        return self._change(names, lambda files, rest: files.truncate(rest, size))
+    def truncate(self, names: Names, size: int) -> None:
+        files, rest = self._loose(names)
+        files.truncate(rest, size)
 
-    def remove(self, names: Names) -> FileRefusal | None:
-        return self._change(names, lambda files, rest: files.remove(rest))
+    def remove(self, names: Names) -> None:
+        files, rest = self._loose(names)
+        files.remove(rest)
 
-    def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        if self._is_fixed(old):
-            return FileRefusal.PROTECTED
-        if self._is_fixed(new):
-            return FileRefusal.EXISTS
-        files, rest = self._at(old)
-        new_files, new_rest = self._at(new)
-        return files.rename(rest, new_rest) if files is new_files else FileRefusal.PROTECTED
+    def rename(self, old: Names, new: Names) -> None:
+        files, rest = self._loose(old)
+        new_files, new_rest = self._loose(new, EEXIST)
+        if files is not new_files:
+            raise refused(EACCES)
+        files.rename(rest, new_rest)
 
-    def make_folder(self, names: Names) -> FileRefusal | None:
-        if self._is_fixed(names):
-            return FileRefusal.EXISTS
-        files, rest = self._at(names)
-        return files.make_folder(rest)
+    def make_folder(self, names: Names) -> None:
+        files, rest = self._loose(names, EEXIST)
+        files.make_folder(rest)
 
-    def remove_folder(self, names: Names) -> FileRefusal | None:
-        return self._change(names, lambda files, rest: files.remove_folder(rest))
+    def remove_folder(self, names: Names) -> None:
+        files, rest = self._loose(names)
+        files.remove_folder(rest)
 
-    def _change(self, names: Names, change: Callable[[Files, Names], FileRefusal | None]) -> FileRefusal | None:
-        return FileRefusal.PROTECTED if self._is_fixed(names) else change(*self._at(names))
-
-    def _is_fixed(self, names: Names) -> bool:
+    def _loose(self, names: Names, refusal: int = EACCES) -> tuple[Files, Names]:
+        """Return the files that have `names`, and its path there; raise `refusal` for a fixed part of the tree."""
         fixed = (self._generated, self._mounts, self._folders, self._aliases)
-        return not names or any(names in places for places in fixed)
+        if not names or any(names in places for places in fixed):
+            raise refused(refusal)
+        return self._at(names)
 
     def _at(self, names: Names) -> tuple[Files, Names]:
         for depth in range(len(names), 0, -1):
@@ -193,6 +187,6 @@ class Tree:
 
 def _known(path: str) -> Names:
     names = names_of(path)
-    if isinstance(names, FileRefusal) or not names:
+    if not names:
         raise ValueError(path)
     return names

@@ -8,7 +8,6 @@ from pyulog import ULog
 
 from colibri.autopilot.ground.onboard_log import DATAFLASH, ULOG, LogFormat, LoggedVehicle, OnboardLog
 from colibri.mavlink.files.memory import MemoryFiles
-from colibri.mavlink.files.tree import OpenFile
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 from colibri.mavlink.services.statustext import INFO, Line
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
@@ -41,8 +40,7 @@ class Flight:
 
     def content(self, name: str) -> bytes:
         reading = self.memory.open(("logs", name))
-        assert isinstance(reading, OpenFile)
-        return bytes(reading.read(0, reading.size))  # type: ignore[arg-type]
+        return reading.read(0, reading.size)
 
     def read(self, name: str = "00001.ulg") -> ULog:
         log = ULog(BytesIO(self.content(name)))
@@ -61,7 +59,7 @@ def times_us(log: ULog, topic: str = "vehicle_local_position") -> list[int]:
 
 
 def names(flight: Flight) -> list[str]:
-    return [entry.name for entry in flight.memory.list(("logs",))]  # type: ignore[union-attr]
+    return [entry.name for entry in flight.memory.list(("logs",))]
 
 
 def test_there_is_one_from_arming_to_disarming(flight: Flight) -> None:

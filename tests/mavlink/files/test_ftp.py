@@ -122,9 +122,9 @@ def test_a_file_is_written(client: Client, memory: MemoryFiles) -> None:
     assert client.ask(Opcode.WRITE, b"x").error == FtpError.INVALID_SESSION
     client.do(Opcode.OPEN_TO_WRITE, b"new")
     client.do(Opcode.WRITE, b"H", offset=0)
-    assert memory.open(("new",)).read(0, 100) == b"Hello world"  # type: ignore[union-attr]
+    assert memory.open(("new",)).read(0, 100) == b"Hello world"
     client.do(Opcode.CREATE, b"new")
-    assert memory.open(("new",)).size == 0  # type: ignore[union-attr]
+    assert memory.open(("new",)).size == 0
 
 
 def test_what_is_open_to_read_is_not_written_and_the_reverse(client: Client) -> None:
@@ -271,7 +271,7 @@ def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Mem
     client.do(Opcode.WRITE, b"hello")
     client.sequence = created
     assert client.send(Opcode.CREATE, b"new")[0].opcode == Opcode.ACK
-    assert memory.open(("new",)).size == 5  # type: ignore[union-attr]
+    assert memory.open(("new",)).size == 5
 
 
 def test_memory_is_bounded(service: Ftp) -> None:

@@ -173,7 +173,7 @@ def test_logs_are_erased_but_for_the_one_being_written(memory: MemoryFiles) -> N
     ask(logs, "LOG_ERASE")
     assert drain(logs, []) == []
     assert entries(logs) == [(0, 1, 0, 0, 180)]
-    assert [entry.name for entry in memory.list(("logs",))] == ["00003.ulg", "no log"]  # type: ignore[union-attr]
+    assert [entry.name for entry in memory.list(("logs",))] == ["00003.ulg", "no log"]
 
 
 def test_many_ids_of_one_channel_end_nobody_elses_download(logs: Logs) -> None:

@@ -2,7 +2,7 @@ import json
 from zlib import crc32
 
 from colibri.mavlink.files.memory import MemoryFiles
-from colibri.mavlink.files.tree import OpenFile, Tree
+from colibri.mavlink.files.tree import Tree
 from colibri.mavlink.parameters.metadata import Metadata, checksum, metadata_json
 from colibri.mavlink.parameters.store import Parameter, ParamType
 from tests.support.messages import GROUND, on_the_wire
@@ -17,10 +17,7 @@ def test_the_message_leads_to_the_parameters() -> None:
     def read(uri: str) -> bytes:
         assert uri.startswith("mftp:///")
         reading = tree.open((uri.removeprefix("mftp:///"),))
-        assert isinstance(reading, OpenFile)
-        data = reading.read(0, reading.size)
-        assert isinstance(data, bytes)
-        return data
+        return reading.read(0, reading.size)
 
     sends = metadata.provide(GROUND, 5_000_000)
     assert [send.channel for send in sends] == [GROUND.channel]
