@@ -257,7 +257,9 @@ class Filter:
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
-        self._doubt_motion()
+        speed_m_s = hypot(*self.velocity.test.innovation)
+        update.inflate_covariance(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
+        update.inflate_covariance(P, VELOCITY, 3, speed_m_s * speed_m_s)
         self.velocity.reset(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us

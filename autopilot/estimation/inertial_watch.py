@@ -11,7 +11,7 @@ _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
 _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
-_MEAN_PART, _HIGH_SIGMAS = 0.2, 1.5  # filter gain of the mean innovation of pressures, and what contradicts
+_MEAN_PART, _HIGH_SIGMAS = 0.2, 2.5  # filter gain of the mean innovation of pressures, and what contradicts
 _STEEP = 9.0  # σ² of the vertical part of a contradicted velocity
 
 
