@@ -135,8 +135,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
         Option("link to a simulator with PX4's interface and sensors, for example jMAVSim: tcp:127.0.0.1:4560", "URL"),
     ] = None
     track: Annotated[
-        str | Trajectory | None,
-        Option("track to fly, as in `colibri fly` (default spiral; with --gcs: none)", "TRACK"),
+        str | Trajectory | None, Option("track to fly, as in `colibri fly` (default spiral; with --gcs: none)", "TRACK")
     ] = None
     stepped: Annotated[
         str | None, Option("for tests: link to one program for all ground stations, frame by frame", "URL")

@@ -26,8 +26,7 @@ class WorldSpec:
     """The world of a flight."""
 
     without: Annotated[
-        tuple[Part, ...],
-        Option("leave out a part of the plant's model; the autopilot's model keeps it"),
+        tuple[Part, ...], Option("leave out a part of the plant's model; the autopilot's model keeps it")
     ] = ()
     wind: Annotated[
         Wind | RecordedWind,
@@ -42,8 +41,7 @@ class WorldSpec:
         tuple[Gust, ...], Option("add a gust of shape 1 - cosine to the wind", GUST, read=gust, flag="gust")
     ] = ()
     turbulence: Annotated[
-        Intensity | None,
-        Option("add Dryden turbulence to the wind, by MIL-F-8785C at low altitude; random by --seed"),
+        Intensity | None, Option("add Dryden turbulence to the wind, by MIL-F-8785C at low altitude; random by --seed")
     ] = None
     noise: Annotated[
         Mapping[str, float],

@@ -136,12 +136,7 @@ def compare(parser: ArgumentParser) -> None:
 def arena(parser: ArgumentParser) -> None:
     add = parser.value
     add("sets", "SET", "race, race-told, robust, policy, planning, or your own FILE.toml", nargs="+")
-    parser.several(
-        "--law",
-        "LAW",
-        "PROFILE, PROFILE:CONTROLLER, CONTROLLER or FILE.py[:CLASS]",
-        "agile, flight, se3",
-    )
+    parser.several("--law", "LAW", "PROFILE, PROFILE:CONTROLLER, CONTROLLER or FILE.py[:CLASS]", "agile, flight, se3")
     add("--starts", "N", "number of starts, 1 mm apart, from 1 to 7; the worst result counts", type=int, default=5)
     _engine(parser)
     parser.flag("--resume", "continue the sets in --out")

@@ -34,8 +34,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     instance: Annotated[int, Option("number of the first vehicle; its system id is N + 1", "N", least=0)] = 0
     count: Annotated[int, Option("number of vehicles", "N", least=0)] = 1
     home: Annotated[
-        HomePlace,
-        Option("origin, degrees and m; yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
+        HomePlace, Option("origin, degrees and m; yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home)
     ] = DEFAULT_HOME
     spacing: Annotated[
         float, Option("distance between the vehicles of a fleet, in a row to the east", "M", "m", least=0.0)
@@ -43,8 +42,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     identity: Annotated[IdentityName, Option("identity for ground stations")] = "px4"
     state: Annotated[Path, Option("folder for parameters and logs", "DIR")] = Path("out/sitl")
     out: Annotated[
-        Path | None,
-        Option("folder for the logs of vehicle N in DIR/N, for `colibri replay` (default: none)", "DIR"),
+        Path | None, Option("folder for the logs of vehicle N in DIR/N, for `colibri replay` (default: none)", "DIR")
     ] = None
     plant_port: Annotated[
         int | None, Option("UDP port of the plant (default: 14560 + N; 0: any free one)", "PORT", least=0, most=65535)

@@ -140,8 +140,7 @@ def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
         station.wait("HEARTBEAT")
         assert station.command(mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, -5.0) != ACCEPTED
         wait_for(
-            lambda: "  1 autopilot: warning: take-off refused: -5 m above the ground" in flown.said,
-            "a STATUSTEXT",
+            lambda: "  1 autopilot: warning: take-off refused: -5 m above the ground" in flown.said, "a STATUSTEXT"
         )
         assert station.command(SHUT_DOWN, 2.0, 0, 0, 0, 0, 0, 0) == ACCEPTED
         assert flown.process.wait(10.0) == 0

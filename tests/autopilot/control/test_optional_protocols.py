@@ -35,12 +35,7 @@ HUMMINGBIRD = load_vehicle("hummingbird")
 NOTHING = (0.0, 0.0, 0.0)
 LEVEL = turned(0.0)
 STAYING = staying(8)
-LAWS = {
-    "lpv-mpc": "flight",
-    "cascade": "thesis",
-    "global-lpv-mpc": "thesis",
-    "geometric-se3": "se3",
-}
+LAWS = {"lpv-mpc": "flight", "cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
 
 
 def law(name: str) -> Controller[Any]:

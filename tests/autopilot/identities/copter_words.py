@@ -39,10 +39,7 @@ def says(sitl: Sitl, words: str, within: float = 20.0) -> None:
 def both(sitl: Sitl, number: int, *params: float, z: float = 0.0) -> tuple[int, int]:
     """Send a command as COMMAND_LONG and as COMMAND_INT."""
     p = (*params, *(0.0,) * (4 - len(params)))
-    return (
-        sitl.gcs.order(number, *p, 0.0, 0.0, z),
-        sitl.gcs.order_int(number, *p, frame=RELATIVE, x=0, y=0, z=z),
-    )
+    return (sitl.gcs.order(number, *p, 0.0, 0.0, z), sitl.gcs.order_int(number, *p, frame=RELATIVE, x=0, y=0, z=z))
 
 
 def held(sitl: Sitl, fact: Callable[[], bool], seconds: float, what: str = "") -> None:

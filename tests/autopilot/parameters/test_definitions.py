@@ -32,7 +32,7 @@ NOT_IN_FLIGHT = {
     "lpv-mpc": {
         *("control_interval_s", "qp.tolerance", "plan.check_every", "plan.count_every", "path.max_speed"),
         *(f"plan.blocks[{place}]" for place in range(6)),
-    },
+    }
 }
 
 

@@ -85,10 +85,7 @@ def test_what_a_file_has_as_levels_can_be_replaced(tmp_path: Path) -> None:
     ("tables", "said"),
     [
         ({"grid": {"track": ["hover"], "plant": {"heavy": {"mass": 1.0}}}}, 'unknown factor "mass" '),
-        (
-            {"grid": {"track": {"one": {"profile": "se3"}}}},
-            "track: a factor with levels needs ",
-        ),
+        ({"grid": {"track": {"one": {"profile": "se3"}}}}, "track: a factor with levels needs "),
         (
             {"grid": {"track": ["hover"], "verdict": {"one": {}}}},
             "verdict: the table would have two columns of that name",

@@ -85,11 +85,7 @@ def test_values_are_shown_as_a_file_has_them(value: Any, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("modules", "names"),
-    [
-        (("before", "after"), ["before.Law", "after.Law"]),
-        (("law", "law"), ["Law (1)", "Law (2)"]),
-    ],
+    ("modules", "names"), [(("before", "after"), ["before.Law", "after.Law"]), (("law", "law"), ["Law (1)", "Law (2)"])]
 )
 def test_classes_of_one_name_are_told_apart(modules: tuple[str, str], names: list[str]) -> None:
     laws = [type("Law", (), {"__module__": module}) for module in modules]

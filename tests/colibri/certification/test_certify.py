@@ -83,10 +83,7 @@ def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
 
 
 def test_flights_tend_to_what_is_certified_at_least_as_fast() -> None:
-    states, proof = (
-        fly(FLIGHT, CERTIFIED.invariant, 50, 0.5, seed=2).states,
-        CERTIFIED.attractor.proof,
-    )
+    states, proof = (fly(FLIGHT, CERTIFIED.invariant, 50, 0.5, seed=2).states, CERTIFIED.attractor.proof)
     values = np.einsum("tfi,ij,tfj->tf", states, proof.P, states)
     assert (values[1:] <= proof.ratio * values[:-1] + 1.0 - proof.ratio + 1e-9).all()
 

@@ -43,10 +43,7 @@ BAD_OPTIONS = [
     ("spiral --speed 0", "--speed: must be a number above 0, or max, not 0"),
     ("spiral --link carrier-pigeon", '--link: unknown value "carrier-pigeon" '),
     ("spiral --without gravity", '--without: unknown value "gravity" (choose '),
-    (
-        "spiral --wind 5m/s@west",
-        "argument --wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not 5m",
-    ),
+    ("spiral --wind 5m/s@west", "argument --wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not 5m"),
     (
         "spiral --wind 5@400",
         "argument --wind: the speed must not be negative, the direction 0 to 360 degrees, not 5@400",

@@ -115,21 +115,9 @@ def test_a_log_that_ends_in_a_long_message_is_not_read_forever(flown: Path, caps
 @pytest.mark.parametrize(
     ("option", "source", "old", "new", "line"),
     [
-        (
-            "--vehicle",
-            VEHICLE,
-            "mass_kg = 0.698",
-            "mass_kg = 1e308",
-            "mass_kg: must be 0, or from 1e-12 to 1e+12",
-        ),
+        ("--vehicle", VEHICLE, "mass_kg = 0.698", "mass_kg = 1e308", "mass_kg: must be 0, or from 1e-12 to 1e+12"),
         ("--vehicle", VEHICLE, "mass_kg = 0.698", "mass_kg = inf", "mass_kg: must be finite"),
-        (
-            "--profile",
-            FLIGHT,
-            "control_interval_s = 0.008  #",
-            "control_interval_s = -1e308  #",
-            "control_interval_s",
-        ),
+        ("--profile", FLIGHT, "control_interval_s = 0.008  #", "control_interval_s = -1e308  #", "control_interval_s"),
         ("--profile", FLIGHT, "max_tilt_deg = 70.0    #", "max_tilt_deg = []    #", "max_tilt_deg"),
     ],
 )

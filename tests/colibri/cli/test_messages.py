@@ -22,10 +22,7 @@ MESSAGES = [
         "campaign --track hover --set duration --out out",
         "expected KEY=VALUES, for example body.mass_kg=0.6:0.8:5, not duration",
     ),
-    (
-        "campaign --track hover --set latency=1 --set latency=2 --out out",
-        "latency is given twice: give all values",
-    ),
+    ("campaign --track hover --set latency=1 --set latency=2 --out out", "latency is given twice: give all values"),
     (
         "campaign --track hover --draw plant-vehicle.body.mass_kg=uniform:3 --out out",
         "plant-vehicle.body.mass_kg: uniform: expected [lowest, highest], not [3]",

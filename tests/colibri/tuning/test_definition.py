@@ -38,23 +38,11 @@ def range_of(**given: Any) -> dict[str, Any]:
         (range_of(choice=[100.0]), "position: choice: needs two values or more"),
         (range_of(choice=[10.0, 20.0]), "position: the profile has 100.0: put it among 10.0, 20.0"),
         (range_of(uniform=[-5, 200]), rf"{POSITION} = -5.0: .*position: Expected `float` >"),
-        (
-            {"tune": {"controllers.lpv-mpc.qp.max_iterations": {"uniform": [1, 900]}}},
-            "max_iterations = 1.0: .*`int`",
-        ),
+        ({"tune": {"controllers.lpv-mpc.qp.max_iterations": {"uniform": [1, 900]}}}, "max_iterations = 1.0: .*`int`"),
         ({"fly": TABLES["fly"] | {f"{WEIGHTS}.rate": 0.02}}, f"{RATE} is given twice: remove it from"),
-        (
-            {"grid": {"track": ["hover"], "profile": ["flight", "thesis"]}},
-            "profile: only one can be tuned",
-        ),
-        (
-            {"grid": {"track": ["hover"], "law": {"own": {"profile": "thesis"}}}},
-            "profile: only one can be tuned",
-        ),
-        (
-            {"grid": {"track": ["hover"], "law": {"own": {f"{WEIGHTS}.rate": 1}}}},
-            f"{RATE} is given twice: remove it",
-        ),
+        ({"grid": {"track": ["hover"], "profile": ["flight", "thesis"]}}, "profile: only one can be tuned"),
+        ({"grid": {"track": ["hover"], "law": {"own": {"profile": "thesis"}}}}, "profile: only one can be tuned"),
+        ({"grid": {"track": ["hover"], "law": {"own": {f"{WEIGHTS}.rate": 1}}}}, f"{RATE} is given twice: remove it"),
         ({"grid": {}}, "no track: add one"),
         ({"objectives": {}}, "objectives: none: add"),
         ({"objectives": {"rmse": "mean"}}, 'objectives: unknown metric "rmse"'),

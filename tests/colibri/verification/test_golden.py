@@ -99,10 +99,7 @@ def test_a_flight_that_does_not_end_differs_and_is_not_renewed(
         ('{"short": "12"}', "holds no golden hashes"),
         ('["short"]', "holds no golden hashes"),
         (json.dumps({"short": WRONG, "corner": WRONG}), "has no hash of golden flight hop: write it again"),
-        (
-            json.dumps(dict.fromkeys(("short", "corner", "hop", "leap"), WRONG)),
-            "names leap, which is not a golden",
-        ),
+        (json.dumps(dict.fromkeys(("short", "corner", "hop", "leap"), WRONG)), "names leap, which is not a golden"),
     ],
 )
 def test_a_file_that_does_not_fit_the_set_is_refused_in_one_line(
