@@ -14,15 +14,15 @@ from tools.harness.processes import fly, rows, topic_rows
 
 HUMMINGBIRD = colibri.load_vehicle("hummingbird")
 IDLE, MAX_SPEED = 83.8, 838.0
-FEW_STARTS = 8
+FEW_STARTS = 6
 """Of the 50 that `make test-long` flies, for longer."""
 
 
 @pytest.mark.parametrize(
     ("track", "duration_s", "reach_m"),
     [
-        ("spiral", 25, 0.001),
-        ("lemniscate", 32, 0.005),
+        ("spiral", 22, 0.001),
+        ("lemniscate", 26, 0.005),
         pytest.param("lemniscate:yaw=fixed", 26, 0.002, marks=pytest.mark.long),
     ],
 )
@@ -64,7 +64,7 @@ WRONG: dict[str, tuple[str, Any]] = {
 
 @pytest.mark.parametrize("what", [pytest.param(it, marks=() if "heavier" in it else pytest.mark.long) for it in WRONG])
 def test_a_wrong_model_costs_little(what: str) -> None:
-    flight = colibri.fly("spiral", duration=25.0, plant_vehicle=HUMMINGBIRD.replace(*WRONG[what]))
+    flight = colibri.fly("spiral", duration=22.0, plant_vehicle=HUMMINGBIRD.replace(*WRONG[what]))
     assert max_error_m(flight.samples, 20.0) < 0.001
     assert flight.report["qp_failures"] == 0
 
@@ -85,7 +85,7 @@ def max_error_m(flown: Any, after_s: float) -> float:
 def test_with_tight_limits_constraints_bind_and_it_still_flies() -> None:
     """600 rad/s at most, hover at 497: take the spiral up from 2 m away, never ask for more."""
     vehicle = HUMMINGBIRD.replace("rotors.max_speed", 600.0).replace("rotors.idle_speed", 60.0)
-    flight = colibri.fly("spiral", duration=25.0, vehicle=vehicle)
+    flight = colibri.fly("spiral", duration=22.0, vehicle=vehicle)
     assert max(flight.frames[f"omega{number}"].max() for number in range(1, 5)) <= 600.0
     assert flight.report["constrained_samples"]["rotors"] > 10
     assert flight.report["qp_failures"] == 0

@@ -13,7 +13,7 @@ from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
 from tools.soak.clients import ACCEPTED, HarnessStation
 
-DURATION = ("--duration", "6")
+DURATION = ("--duration", "4")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
 
 
@@ -56,7 +56,7 @@ def test_every_control_law_flies_where_it_is_sent(sitl_fleet: Callable[..., list
     sitl.run(8.0)
     assert sitl.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
     sitl.select(Mode.TRACK)
-    sitl.run(20.0)
+    sitl.run(10.0)
     assert sitl.mode is Mode.TRACK
 
 

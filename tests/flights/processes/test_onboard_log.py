@@ -54,7 +54,7 @@ def downloaded(port: int) -> bytes:
     return log.data
 
 
-@pytest.fixture(scope="module", params=["state", "sensors"])
+@pytest.fixture(scope="module", params=["state", pytest.param("sensors", marks=pytest.mark.long)])
 def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Flown:
     folder = tmp_path_factory.mktemp("flown")
     out = folder / "out"

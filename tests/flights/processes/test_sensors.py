@@ -34,7 +34,7 @@ def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
 
 
 def test_the_track_begins_once_the_estimate_is_aligned(tmp_path: Path) -> None:
-    options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "30", "--seed", "1")
+    options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "24", "--seed", "1")
     figures = fly(tmp_path, *ON_SENSORS, *options)
     truth = topic_rows(tmp_path)
     assert figures["start"]["z"] == figures["start"]["rotors"] == 0.0
