@@ -7,7 +7,7 @@ from hypothesis import settings
 
 from colibri.common.process.lifecycle import freeze_once, use_one_thread
 
-settings.register_profile("same-verdict", deadline=None, derandomize=True, max_examples=60, print_blob=True)
+settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
 
 use_one_thread()  # before numpy is loaded: two workers have a core each
