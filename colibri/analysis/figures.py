@@ -39,7 +39,6 @@ _PNG_LEVEL = 3
 _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
-
 Figures: TypeAlias = Mapping[str, Callable[[], Figure]]
 """Functions that draw figures, by name."""
 

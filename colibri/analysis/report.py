@@ -99,7 +99,6 @@ def report(
 
 
 def _within(plan: FlightPlan, t: Array, error: Array) -> Array:
-    """Return the errors in the window, if there is one."""
     if (window := plan.spec.window) is None:
         return error[:0]
     within: Array = error[(t >= window.begin_s - _INSTANT_S) & (t <= window.end_s + _INSTANT_S)]

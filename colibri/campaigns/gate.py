@@ -73,7 +73,6 @@ def _value(cell: str) -> Any:
 
 
 def _write_junit(table: FlightTable, reasons: list[list[str]], path: Path, *, lost: bool) -> None:
-    """Write one test case for each flight; flights lost within `--fail-lost` are skipped."""
     suite = ElementTree.Element("testsuite", name=table.campaign.name, tests=str(len(reasons)))
     factors = len(table.campaign.factors) + 2
     counts = {"failure": 0, "skipped": 0}

@@ -23,21 +23,18 @@ from colibri.common.types import Array
 PHI, P, THETA, Q, PSI, R, M1, M2, M3 = range(9)
 """States of the attitude and its moments; the remembered commands follow."""
 STATES, INPUTS = 9, 3
-ANGLES, RATES = (PHI, THETA, PSI), (P, Q, R)
+ANGLES, RATES = [PHI, THETA, PSI], [P, Q, R]
 _SIZE = STATES + INPUTS
-_ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS = list(range(M1, M3 + 1))
 _COMMANDS = list(range(STATES, _SIZE))
 _SIGNS = (-1, 1)
 MIRRORS = ((-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1), (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1))
 """Signs of the states under exchange of left and right, and of fore and aft."""
 
-
 _HALF_A_TURN = 4
 """Half a turn or more, rad."""
 _STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
 """phi, theta, psi, rad, to p, q, r, rad/s."""
-
 
 Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""
@@ -126,16 +123,14 @@ def attitude_loop(numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
     weight = np.concatenate([n.angle_weight, n.rate_weight])
     return UncertainLoop(
         vertices=np.array([_transition(T, G, n, eye) for T in box.kinematic for G in box.gyroscopic]),
-        entries=np.hstack([eye[:, _ANGLES + _RATES], _of_commands(n, eye), eye[:, _COMMANDS]]),
-        channels=np.vstack(
-            [eye[_RATES], eye[_MOMENTS], applied, eye[_ANGLES], eye[_COMMANDS], applied - eye[_MOMENTS]]
-        ),
+        entries=np.hstack([eye[:, ANGLES + RATES], _of_commands(n, eye), eye[:, _COMMANDS]]),
+        channels=np.vstack([eye[RATES], eye[_MOMENTS], applied, eye[ANGLES], eye[_COMMANDS], applied - eye[_MOMENTS]]),
         gains=gains,
         offsets=offsets,
-        disturbance=eye[:, _RATES] * (n.interval_s * n.disturbance_n_m / n.inertia_kg_m2),
+        disturbance=eye[:, RATES] * (n.interval_s * n.disturbance_n_m / n.inertia_kg_m2),
         limits=_limits(n, box, eye),
-        starts=np.diag([number(start) for start in _STARTS]) @ eye[_ANGLES + _RATES],
-        stage=(eye[:, _ANGLES + _RATES] * weight) @ eye[_ANGLES + _RATES] + (change.T * n.increment_weight) @ change,
+        starts=np.diag([number(start) for start in _STARTS]) @ eye[ANGLES + RATES],
+        stage=(eye[:, ANGLES + RATES] * weight) @ eye[ANGLES + RATES] + (change.T * n.increment_weight) @ change,
         mirrors=np.array(MIRRORS),
     ).reduced()
 
@@ -193,8 +188,8 @@ def _transition(T: AnyArray, G: AnyArray, n: AttitudeNumbers, eye: AnyArray) -> 
     moments, (applied, remembered) = eye[_MOMENTS], n.commanded
     once, twice = _pushes(n, moments, applied)
     A = 0 * eye
-    A[_ANGLES] = eye[_ANGLES] + T @ (n.interval_s * eye[_RATES] + twice)
-    A[_RATES] = eye[_RATES] + n.interval_s * (G @ eye[_RATES]) + once
+    A[ANGLES] = eye[ANGLES] + T @ (n.interval_s * eye[RATES] + twice)
+    A[RATES] = eye[RATES] + n.interval_s * (G @ eye[RATES]) + once
     A[_MOMENTS] = n.stays * moments + (1 - n.stays) * applied
     A[_COMMANDS] = remembered
     return A
@@ -204,7 +199,7 @@ def _of_commands(n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
     one = eye[:INPUTS, :INPUTS]
     once, twice = _pushes(n, 0 * one, one)
     B = 0 * eye[:, :INPUTS]
-    B[_ANGLES], B[_RATES], B[_MOMENTS] = twice, once, (1 - n.stays) * one
+    B[ANGLES], B[RATES], B[_MOMENTS] = twice, once, (1 - n.stays) * one
     return B
 
 
@@ -230,14 +225,14 @@ def _remainders(n: AttitudeNumbers, box: VertexBox) -> tuple[AnyArray, AnyArray]
     none = 0 * G
     beyond = (by_commands + by_changes + np.vstack([box.beside @ abs(turning), none])) @ n.unsure[0]
     of_states = np.vstack([beyond, *n.unsure])
-    of_states[:6, _RATES] += np.vstack([drifted, turned + h * _rotors(n)])
+    of_states[:6, RATES] += np.vstack([drifted, turned + h * _rotors(n)])
     of_states[:6, _MOMENTS] += np.vstack(
         [(b1 * drifted + c1 * twice) * by_inertia, (b1 * turned + c1 * G) * by_inertia]
     )
-    of_rest = np.hstack([of_states[:, _ANGLES], of_states[:, _COMMANDS]])
+    of_rest = np.hstack([of_states[:, ANGLES], of_states[:, _COMMANDS]])
     gains = np.hstack(
         [
-            of_states[:, _RATES],
+            of_states[:, RATES],
             of_states[:, _MOMENTS],
             np.vstack([by_commands, none, none]),
             of_rest,
@@ -261,7 +256,6 @@ def _inverse(matrix: AnyArray) -> AnyArray:
 
 
 def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
-    """Return the rows of limits, less the motion within an interval."""
     if n.headroom <= 0:
         raise RangeError("the thrust uses the full range of the rotors: no moments remain")
     h, rates = n.interval_s, n.rates_rad_s
@@ -275,8 +269,8 @@ def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
         raise RangeError("the commands beyond the gain exceed the rotors")
     change = n.commanded[0] - eye[_COMMANDS]
     rows = [
-        eye[_ANGLES[:limited]] / angles_left[:, None],
-        eye[_RATES] / rates_left[:, None],
+        eye[ANGLES[:limited]] / angles_left[:, None],
+        eye[RATES] / rates_left[:, None],
         change[: len(n.max_increment_n_m)] / n.max_increment_n_m[:, None],
         *(n.from_moments @ C / left[:, None] for C, left in zip(n.commanded, rotors_left, strict=True)),
         n.from_moments @ eye[_MOMENTS] / n.headroom,
@@ -300,6 +294,6 @@ def _turns(n: AttitudeNumbers, box: VertexBox) -> AnyArray:
 def _unsure_speeds(n: AttitudeNumbers, box: VertexBox) -> AnyArray:
     largest = np.concatenate([n.rates_rad_s, _moments(n), _moments(n)])
     angles = np.concatenate([box.max_angles, [_HALF_A_TURN] * (INPUTS - len(box.max_angles))])
-    beyond = n.unsure[:, :, _RATES + _MOMENTS + _COMMANDS] @ largest + n.unsure[:, :, _ANGLES] @ angles
+    beyond = n.unsure[:, :, RATES + _MOMENTS + _COMMANDS] @ largest + n.unsure[:, :, ANGLES] @ angles
     squared: AnyArray = beyond @ abs(n.from_moments).T
     return squared

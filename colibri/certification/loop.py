@@ -22,7 +22,6 @@ AnyArray: TypeAlias = NDArray[Any]
 Number: TypeAlias = Callable[[float], Any]
 """`float`, or `fractions.Fraction`."""
 
-
 _DIGITS = 9
 """Precision of comparisons of floats."""
 

@@ -205,7 +205,6 @@ def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float
 
 
 def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) -> tuple[float, Proof] | None:
-    """Return the value nearest to `bad` with a proof, if any."""
     best = find(good)
     if best is None:
         return None

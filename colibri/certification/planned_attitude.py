@@ -40,7 +40,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 _DIGITS = 10
 _GAIN_DIGITS = 8
-_ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
 _STEP = 1e-4
 """Step of a derivative, rad, rad/s and N m."""
@@ -76,7 +75,7 @@ class PlannedAttitude:
         mpc = Mpc(plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0)
         self._from_wrench, self._to_wrench = mpc.from_wrench, self._law.tracker.allocation
         of_state = np.zeros((len(mpc.terminal_on_hold), STATES + INPUTS))
-        of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
+        of_state[range(ROTATION, DEVIATIONS), ANGLES + RATES] = 1.0
         of_state[DEVIATIONS : DEVIATIONS + len(self._from_wrench), _MOMENTS] = self._from_wrench[:, 1:]
         self.terminal_weight = of_state.T @ mpc.terminal_on_hold @ of_state
         self._horizon = sum(self._settings.plan.blocks)
@@ -165,9 +164,9 @@ class PlannedAttitude:
         tracked = law.initial(0.0).tracked._replace(
             speeds=np.sqrt(self._squared(thrust_n, z[_MOMENTS])), charge_ah=self._charge_ah
         )
-        half = 0.5 * z[_ANGLES]
+        half = 0.5 * z[ANGLES]
         attitude = quaternion_product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))
-        nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[_RATES].tolist()
+        nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[RATES].tolist()
         state = VehicleState(nowhere, nowhere, attitude, euler_from_quaternion(attitude), (p, q, r))
         demand = AttitudeDemand(np.tile(held, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
         after, _ = law.step_attitude(LawMemory(tracked, plan, 1, 0), 0, state, demand)

@@ -38,7 +38,6 @@ from colibri.flights.folder import occupied
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 _SUBSTEPS = 4
-_ANGLES, _RATES = list(ANGLES), list(RATES)
 _RESONANCE_RAD_S = 28.0
 """Of roll and pitch in profile flight."""
 _KINDS = 4
@@ -80,7 +79,7 @@ def fly(law: PlannedAttitude, entry: ProofEntry, flights: int, duration_s: float
         commands, remembered = flyer.commands(z)
         beyond_n_m = np.maximum(beyond_n_m, np.abs(commands - z @ gain.T).max(axis=0))
         swinging = constant * np.sin(_RESONANCE_RAD_S * numbers.interval_s * step)
-        worst = _unit_vectors(z @ proof.P[:, _RATES] / inertia)
+        worst = _unit_vectors(z @ proof.P[:, RATES] / inertia)
         disturbance_n_m = numbers.disturbance_n_m * np.choose(
             kinds, [constant, _directions(rng, flights, INPUTS), swinging, worst]
         )
@@ -105,7 +104,7 @@ def integrate(x: Array, interval: Interval, duration_s: float) -> Array:
 
 
 def _derivative(x: Array, interval: Interval) -> Array:
-    rate, moment = x[:, _RATES], x[:, M1:]
+    rate, moment = x[:, RATES], x[:, M1:]
     change = np.zeros_like(x)
     if interval.lag_s:
         change[:, M1:] = (interval.commands - moment) / interval.lag_s
@@ -114,8 +113,8 @@ def _derivative(x: Array, interval: Interval) -> Array:
     carried[:, 2] += momentum
     turning = moment + interval.disturbance_n_m - np.cross(rate, carried)
     turning[:, 2] -= spinning
-    change[:, _ANGLES] = interval.turn(x[:, _ANGLES], rate)
-    change[:, _RATES] = turning / interval.inertia
+    change[:, ANGLES] = interval.turn(x[:, ANGLES], rate)
+    change[:, RATES] = turning / interval.inertia
     return change
 
 
@@ -190,7 +189,6 @@ def _unit(state: int) -> float:
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
 LAW = "lpv-mpc"
 _DURATION_S = 1.0
-_STATES = 12
 _SEEN = 1e-12
 """Smallest eigenvalue of a weight over its largest that counts."""
 _NOT_PROVEN = (
@@ -292,11 +290,11 @@ def _ranges(what: str, entry: ProofEntry, law: PlannedAttitude) -> tuple[str, ..
 
 
 def _reach(what: str, entry: ProofEntry, how: str = "") -> tuple[str, ...]:
-    return what, *_triples(entry.proof.reach(np.eye(_STATES))), how
+    return what, *_triples(entry.proof.reach(np.eye(STATES + INPUTS))), how
 
 
 def _triples(states: Array) -> tuple[str, str]:
-    angles, rates = np.degrees(states[list(ANGLES)]), states[list(RATES)]
+    angles, rates = np.degrees(states[ANGLES]), states[RATES]
     return ", ".join(f"{value:.2f}" for value in angles), ", ".join(f"{value:.2f}" for value in rates)
 
 

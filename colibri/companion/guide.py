@@ -200,7 +200,6 @@ class Companion:
         self._consistency.jumped_m = 0.0
 
     def _rehearse(self, now_us: int) -> None:
-        """Add the failures of a law that runs without flying."""
         if self._law_error:
             self.failing.append(f"control law: {self._law_error}")
         elif not self.failing and self._pace.kept(now_us, self.interval_us) < self._settings.limits.min_pace:

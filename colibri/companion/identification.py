@@ -9,9 +9,8 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from colibri.common.types import Array
-from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
-from colibri.companion.stack import Response, response_text
+from colibri.companion.stack import CompanionError, Response, response_text
 
 _GRID_S = 0.002
 MAX_LATENCY_S = 0.12

@@ -16,7 +16,7 @@ from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.errors import shown
 from colibri.common.files import read_text
 from colibri.common.types import Vector
-from colibri.companion.errors import CompanionError
+from colibri.companion.stack import CompanionError
 from colibri.companion.vehicle_peer import LocalOrigin
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import misplaced

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import perf_counter, time
 from typing import Any, NamedTuple, TextIO
 
+from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.report import length, write_report
 from colibri.autopilot.control.interface import Fallback
 from colibri.autopilot.control.profile import Profile, load_profile
@@ -20,12 +21,11 @@ from colibri.common.files import regular
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen, handle_endings, one_line
 from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
-from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
 from colibri.companion.setpoints import FlightSummary, LogRow
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stack import STACKS, read_response
+from colibri.companion.stack import STACKS, CompanionError, read_response
 from colibri.companion.steering.references import stay_of
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
@@ -270,7 +270,6 @@ class _Log:
 
 
 def _signing(path: Path | None) -> tuple[Signing | None, str]:
-    """Return the signing by a key file, and a warning if others can read it."""
     if path is None:
         return None, ""
     try:
@@ -306,9 +305,6 @@ def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Pat
     if ended.in_order:
         return 0
     fail(f"{ended.why}; logs are in {out}", EXIT_FAILED)
-
-
-SETTLED_AFTER_S = 20.0
 
 
 def report(companion: Companion, summary: FlightSummary, args: Namespace, plan: CompanionFlight) -> dict[str, Any]:

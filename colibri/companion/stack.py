@@ -14,13 +14,17 @@ from typing import Annotated, NamedTuple, TypeAlias
 import msgspec
 
 from colibri.common.config import UNREADABLE, NotNegative, Positive, Table
+from colibri.common.errors import Error
 from colibri.common.files import read_text
 from colibri.common.types import Vector
-from colibri.companion.errors import CompanionError
 from colibri.mavlink.client.modes import COPTER_MODES, PX4_MODES, FlightMode
 from colibri.mavlink.services.identity import PRODUCT
 from colibri.mavlink.wire.dialect import AUTOPILOT_GENERIC, mav
 from colibri.plant.vehicle.description import Vehicle
+
+
+class CompanionError(Error):
+    """The companion cannot begin with its input."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,8 +78,6 @@ class MiddleHovers:
 
 
 Thrust = ThrustCurve | MiddleHovers
-
-
 Parameters: TypeAlias = Mapping[str, float]
 """Parameters of the vehicle, by name."""
 
@@ -149,7 +151,6 @@ _PX4_STATUS_HZ = {"CURRENT_MODE": 25.0, "ESTIMATOR_STATUS": 5.0, **_STATUS_HZ}
 
 
 def _curve(numbers: Mapping[str, tuple[str, float]]) -> Callable[[Parameters, Vehicle], ThrustCurve]:
-    """Return a thrust curve by parameters, each with its default."""
 
     def thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
         found = {number: parameters.get(name, default) for number, (name, default) in numbers.items()}
@@ -210,7 +211,6 @@ ARDUPILOT = Stack(
     take_off=TakeOffOrder.ARM_THEN_COMMAND,
     integers_by_bits=False,
 )
-
 
 _IDENTIFIED = Response((0.032, 0.032, 0.128), 0.010, 0.0, (4.0, 4.0, 2.0), (120.0, 120.0, 15.0), (0.014, 0.014, 0.010))
 """Result of --identify, the same for any airframe."""

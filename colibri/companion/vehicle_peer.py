@@ -168,7 +168,6 @@ class VehiclePeer:
         ]
 
     def _renew_streams(self, now_us: int) -> None:
-        """Request the streams while states arrive too slowly or a report is old."""
         under_way = any(stream.result is None for stream in self._streams)
         if self.stack is None or now_us < self._renew_at_us or under_way:
             return

@@ -212,7 +212,6 @@ def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:
 
 
 def _usual_start(profile: Profile, vehicle: Vehicle, flown: Track, feedback: Feedback) -> Start:
-    """Return a start at rest with the first yaw, on the track; with sensors on the ground."""
     x, y, z = profile.simulation.position_enu_m or position(flown, np.zeros(1))[0].tolist()
     yaw_deg = degrees(start_yaw(flown, profile.references))
     if feedback is Feedback.SENSORS:

@@ -320,7 +320,6 @@ class Episodes:
         return Begun(vehicle, wind, lost, x, action, parameters, mixer, scale)
 
     def _built(self, changes: list[tuple[str, Any]]) -> tuple[Any, ...]:
-        """Return the vehicle with changes, and what follows from it."""
         if self._last_built is None or self._last_built[0] != changes:
             vehicle = self.vehicle
             for key, value in changes:

@@ -99,7 +99,6 @@ class Record:
 
 
 def _layout(rotors: int) -> tuple[tuple[str, ...], Struct, Struct]:
-    """Return names and layout of rows, and the layout of what is hashed."""
     names = (*_STATE, *(f"control{number}" for number in range(1, rotors + 1)), "armed", "custom_mode")
     return names, Struct(f"<{len(names)}d"), Struct(f"<Q13d{rotors}d?")
 

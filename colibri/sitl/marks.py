@@ -89,7 +89,6 @@ def without_effect(item: pytest.Item, fixtures: Iterable[str], registered: list[
 
 
 def _typo(mark: pytest.Mark, registered: list[str]) -> str | None:
-    """Return what an unregistered mark with arguments was meant to be."""
     if mark.name in registered or not (mark.args or mark.kwargs):
         return None
     from colibri.common.spec import fields_of

@@ -57,7 +57,7 @@ class Integers(NamedTuple):
         return self
 
 
-Range: TypeAlias = Uniform | LogUniform | Integers | Choice
+Range: TypeAlias = Uniform | Integers | Choice
 
 
 def read_range(key: str, given: Any) -> Range:
@@ -67,8 +67,7 @@ def read_range(key: str, given: Any) -> Range:
         raise TuningError(f"{key}: expected one of {', '.join(_KINDS)}, as in {{ uniform = [2, 20] }}, not {given}")
     if kind != "integers":
         read = read_draw(key, given)
-        if not isinstance(read, Uniform | LogUniform | Choice):
-            raise TypeError(read)
+        assert isinstance(read, Uniform | Choice), "normal is not among the kinds"
         if isinstance(read, Choice) and len(read.values) < 2:
             raise TuningError(f"{key}: choice: needs two values or more")
         return read
@@ -106,7 +105,7 @@ def distribution(values: Range) -> Any:
 
 def as_tried(values: Range, value: Any) -> Any:
     """Round a value to four digits, for people to read and write."""
-    if not isinstance(values, Uniform | LogUniform):
+    if not isinstance(values, Uniform):
         return value
     return min(max(float(f"{value:.{_DIGITS}g}"), values.low), values.high)
 
@@ -318,8 +317,7 @@ def _space(tables: TuningTables) -> dict[str, Range]:
 
 def _had(base: Profile, name: str) -> Any:
     key = key_of(name)
-    if key is None:
-        raise KeyError(name)
+    assert key is not None, "a tuned number is a key"
     had = base.value(key.key)
     return 1.0 if key.scaled else had
 

@@ -169,8 +169,7 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
     lines = [*origin, "Tuned numbers, with their original values:"]
     for factor in factors:
         key = key_of(factor)
-        if key is None:
-            raise KeyError(factor)
+        assert key is not None, "a tuned number is a key"
         was, now = (profile.value(key.key) for profile in (base, tuned))
         _set(document, key.key, now)
         lines.append(f"  {key.key} = {now}  # {was}")

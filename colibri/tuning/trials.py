@@ -58,20 +58,15 @@ class JournalLock(FileLock):
         self._journal = journal
 
     def acquire(self, *, wait: bool = True) -> bool:
-        taken = super().acquire(wait=wait)
-        if taken:
-            _cut_off(self._journal)
-        return taken
-
-
-def _cut_off(journal: Path) -> None:
-    with open(journal, "r+b", opener=regular) as file:
-        end = file.seek(0, os.SEEK_END)
-        if end:
-            file.seek(end - 1)
-            if file.read(1) != b"\n":
-                file.seek(0)
-                file.truncate(file.read().rfind(b"\n") + 1)
+        if not super().acquire(wait=wait):
+            return False
+        with open(self._journal, "r+b", opener=regular) as file:
+            if file.seek(0, os.SEEK_END):
+                file.seek(-1, os.SEEK_END)
+                if file.read() != b"\n":
+                    file.seek(0)
+                    file.truncate(file.read().rfind(b"\n") + 1)
+        return True
 
 
 _PACKAGE = "colibri-sitl"
@@ -257,12 +252,5 @@ def _unwarned() -> Iterator[None]:
 
 def _ended(trial: "FrozenTrial") -> FinishedTrial:
     kept = trial.user_attrs
-    return FinishedTrial(
-        number=int(kept[_NUMBER]),
-        values=tuple(trial.values),
-        params=dict(trial.params),
-        flights=int(kept[_FLIGHTS]),
-        lost=int(kept[_LOST]),
-        pruned=bool(kept[_PRUNED]),
-        attributes=kept,
-    )
+    counts = (kept[_FLIGHTS], kept[_LOST], kept[_PRUNED])
+    return FinishedTrial(kept[_NUMBER], tuple(trial.values), dict(trial.params), *counts, kept)

@@ -117,11 +117,10 @@ def export(folders: Sequence[Path], path: Path) -> None:
 
 def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
     """Read flights; horizons are computed while `held` is open, or `wait` for all."""
-    flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
-    for folder, flight in zip(folders, flights, strict=True):
-        horizons = Horizons()
-        flight.use_horizons(horizons)
-        process = HorizonProcess(folder, horizons)
+    horizons = [Horizons() for _ in folders]
+    flights = [RecordedFlight(*each) for each in zip(folders, _names(folders), horizons, strict=True)]
+    for folder, known in zip(folders, horizons, strict=True):
+        process = HorizonProcess(folder, known)
         held.callback(process.close)
         if wait:
             process.wait()

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from colibri.common.rotations import normalized
 from colibri.common.types import Quaternion, Vector
 from colibri.companion.supervision.rules import FlightFacts, Rule
+from colibri.companion.vehicle_peer import ReceivedState
 from colibri.mavlink.client.states import TimedState
 
 
@@ -122,11 +123,6 @@ _WINDOWS = 2
 """A correction of the estimate contradicts once, stale values again and again."""
 
 
-class _Start(NamedTuple):
-    at_us: int
-    state: TimedState
-
-
 class Consistency:
     """Integrates body rates and velocity over windows.
 
@@ -137,14 +133,14 @@ class Consistency:
 
     def __init__(self) -> None:
         self.contradiction, self.jumped_m = "", 0.0
-        self._start: _Start | None = None
-        self._last: _Start | None = None
+        self._start: ReceivedState | None = None
+        self._last: ReceivedState | None = None
         self._turned: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._moved: Vector = (0.0, 0.0, 0.0)
         self._windows = 0
 
     def add(self, at_us: int, state: TimedState) -> None:
-        now, last = _Start(at_us, state), self._last
+        now, last = ReceivedState(at_us, state), self._last
         self._last = now
         if last is not None and (at_us - last.at_us) * 1e-6 < MAX_JUMP_GAP_S:
             self._judge_jump(last, now)
@@ -162,13 +158,13 @@ class Consistency:
             self._judge(state)
             self._begin(now)
 
-    def _judge_jump(self, last: _Start, now: _Start) -> None:
+    def _judge_jump(self, last: ReceivedState, now: ReceivedState) -> None:
         passed_s = (now.at_us - last.at_us) * 1e-6
         (x, y, z), (vx, vy, vz) = last.state.position_enu_m, last.state.velocity_enu_m_s
         there = (x + passed_s * vx, y + passed_s * vy, z + passed_s * vz)
         self.jumped_m = max(self.jumped_m, dist(there, now.state.position_enu_m))
 
-    def _begin(self, now: _Start) -> None:
+    def _begin(self, now: ReceivedState) -> None:
         self._start, self._turned, self._moved = now, now.state.attitude, now.state.position_enu_m
 
     def _judge(self, state: TimedState) -> None:

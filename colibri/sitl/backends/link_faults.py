@@ -18,7 +18,6 @@ __tracebackhide__ = True  # a failed test shows its own lines, not these
 _HELD_BACK_S = 0.05
 """Largest delay of a reordered datagram."""
 
-
 _MAX = {"loss": 1.0, "delay_s": inf, "jitter_s": inf, "duplicate": 1.0, "reorder": 1.0, "corrupt": 1.0, "down": True}
 """Largest value of each fault; the smallest is 0."""
 
@@ -135,7 +134,6 @@ class QuickClock:
 
 
 LinkClock: TypeAlias = StoppedClock | QuickClock
-
 
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
 _ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")

@@ -21,7 +21,7 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import Vehicle
 from colibri.view.geometry import thinned
 from colibri.view.recorded.horizons import Horizons
-from colibri.view.snapshot import NO_POINTS, NOWHERE, Chart, Snapshot, Surroundings, VehicleShape, ViewError
+from colibri.view.snapshot import NOWHERE, Chart, Snapshot, Surroundings, VehicleShape, ViewError
 
 MAX_ROWS = 30_000
 """Rows in memory: ten minutes at 50 Hz."""
@@ -49,7 +49,7 @@ class LogColumns(NamedTuple):
 class RecordedFlight:
     """A recorded flight, reduced for display; a `Source`."""
 
-    def __init__(self, folder: Path, name: str = "") -> None:
+    def __init__(self, folder: Path, name: str = "", horizons: Horizons | None = None) -> None:
         try:
             self.plan = plan_of(folder)
             log = FlightFile(folder / FILE)
@@ -70,7 +70,7 @@ class RecordedFlight:
         self._place = self._truth.columns("x", "y", "z")
         self._reference = _reference(self.plan, self._truth.times_s, self._decisions)
         self._full_speed = self.plan.plant_vehicle.rotors.max_speed
-        self._horizons: Horizons | None = None
+        self._horizons = horizons or Horizons()
         self._events = _events(self._decisions)
         self.surroundings = Surroundings(
             ground_m=_ground_m(self.plan.plant_vehicle, self._place),
@@ -82,9 +82,6 @@ class RecordedFlight:
     @property
     def is_live(self) -> bool:
         return False
-
-    def use_horizons(self, horizons: Horizons) -> None:
-        self._horizons = horizons
 
     def at(self, time_s: float) -> Snapshot:
         truth, times_s = self._truth, self._truth.times_s
@@ -106,7 +103,7 @@ class RecordedFlight:
             rotors=tuple(speeds.tolist()),
             reference_enu_m=_vector(_between(times_s, self._reference, at_s)),
             trail=trail,
-            horizon=NO_POINTS if self._horizons is None else self._horizons.at(at_s),
+            horizon=self._horizons.at(at_s),
             wind_enu_m_s=_vector(truth.at(at_s, "wind_east", "wind_north", "wind_up")),
             estimate_enu_m=estimate,
             sigma_m=sigma,

@@ -12,9 +12,9 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import track_through
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
-from colibri.companion.errors import CompanionError
 from colibri.companion.plan_file import read_plan
 from colibri.companion.settings import CompanionSettings
+from colibri.companion.stack import CompanionError
 from colibri.companion.vehicle_peer import HomeSeeker, LocalOrigin, VehiclePeer
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.backends.setting import Setting

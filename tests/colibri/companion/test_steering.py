@@ -7,9 +7,8 @@ from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.jit import packed
 from colibri.common.types import Array
-from colibri.companion.errors import CompanionError
 from colibri.companion.identification import RateLog, fit
-from colibri.companion.stack import PX4, Response, read_response, response_text
+from colibri.companion.stack import PX4, CompanionError, Response, read_response, response_text
 from colibri.companion.steering import predictor as model
 from colibri.companion.steering.law_pilot import turning_no_faster
 from colibri.companion.steering.references import OVER_S, duration_s, smoothly_started, step_at

@@ -56,11 +56,11 @@ def test_charts_have_all_that_is_judged(recorded: RecordedFlight) -> None:
         assert (np.diff(chart.times_s) >= 0.0).all()
 
 
-def test_horizons_begin_at_the_vehicle_and_lead_ahead(folder: Path, recorded: RecordedFlight) -> None:
+def test_horizons_begin_at_the_vehicle_and_lead_ahead(folder: Path) -> None:
     horizons = Horizons()
     for time_s, points in predicted(folder):
         horizons.add(time_s, points)
-    recorded.use_horizons(horizons)
+    recorded = RecordedFlight(folder, horizons=horizons)
     now = recorded.at(1.5)
     assert len(now.horizon) > 2
     assert now.horizon[0].tolist() == pytest.approx(now.estimate_enu_m, abs=0.1)
