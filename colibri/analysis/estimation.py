@@ -50,19 +50,14 @@ _COVARIANCE = slice(11, 56)
 
 
 class Estimation(NamedTuple):
-    """Errors of the estimate at n control samples, and of the filter at m checks.
+    """Errors of the estimate at n control samples, and of the filter at m checks."""
 
-    Attributes:
-        position_m, attitude_rad: Estimated minus true, ENU and roll, pitch, yaw, (3, n).
-        nis, accepted: Cumulative NIS and innovations by `kinds`, (k, m).
-    """
-
-    position_m: Array
-    attitude_rad: Array
+    position_m: Array  # estimated minus true, ENU, (3, n)
+    attitude_rad: Array  # estimated minus true, roll, pitch, yaw, (3, n)
     control_m: Array  # distance from the reference, (n,)
     nees: Array  # of position, velocity and attitude, (m,)
-    nis: Array
-    accepted: Array
+    nis: Array  # cumulative, by `kinds`, (k, m)
+    accepted: Array  # innovations, cumulative, (k, m)
     kinds: tuple[str, ...]
 
     def figures(self) -> dict[str, Any]:

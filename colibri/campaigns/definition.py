@@ -85,11 +85,7 @@ MAX_UNASKED = 1_000_000
 
 
 class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Tables shared by the files of campaigns and tunings.
-
-    Attributes:
-        grid: Factors with several values. A factor that is neither option nor key has levels: named tables of settings.
-    """
+    """Tables shared by the files of campaigns and tunings."""
 
     FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")
     name: str = "campaign"
@@ -97,7 +93,7 @@ class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     root_seed: int = 0  # seed of the draws
     metrics: Any = None
     fly: dict[str, Any] = {}
-    grid: dict[str, Any] = {}
+    grid: dict[str, Any] = {}  # factors with several values, or with levels: named tables of settings
     draw: dict[str, Any] = {}  # factors drawn at random for each flight
 
 

@@ -71,18 +71,11 @@ class AttitudeNumbers(NamedTuple):
     increment_weight: Any
 
 
-class Kinematic(NamedTuple):
-    """Bounds of Φ' = T ω: vertices of T, largest |dT/dt|, and limits of the first angles, rad."""
+def of_error(n: AttitudeNumbers) -> tuple[AnyArray, AnyArray, AnyArray]:
+    """Return vertices of T, largest |dT/dt| and limits of the angles, rad, of ε' = T ω with T = η + ½ [ε]×.
 
-    vertices: AnyArray
-    max_change: AnyArray
-    max_angles: AnyArray
-
-
-def of_error(n: AttitudeNumbers) -> Kinematic:
-    """Return T of ε, twice the vector part of the error quaternion, in body axes: ε' = (η + ½ [ε]×) ω.
-
-    It is affine in ε and η = √(1 - ¼ ε²). `n.angles` are the ranges of |ε|, and the least η.
+    ε is twice the vector part of the error quaternion, in body axes, with η = √(1 - ¼ ε²). `n.angles` are the ranges of
+    |ε|, and the least η.
     """
     *ranges, least = n.angles
     x, y, z = ranges = np.array(ranges)
@@ -93,7 +86,7 @@ def of_error(n: AttitudeNumbers) -> Kinematic:
     change = abs(vertices).max(0) @ n.rates_rad_s / 2  # of ½ ε
     along = ranges @ n.rates_rad_s / 4
     dx, dy, dz = change
-    return Kinematic(vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges)
+    return vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges
 
 
 def _of_quaternion(error: AnyArray, eta: Any) -> AnyArray:

@@ -175,18 +175,6 @@ def write(certificate: Certificate, about: dict[str, Any], path: Path) -> None:
     path.write_bytes(msgspec.json.format(msgspec.json.encode(entries, enc_hook=lambda array: array.tolist()), indent=1))
 
 
-def read(path: Path, numbers: Callable[..., Any]) -> Certificate:
-    entries: dict[str, dict[str, Any]] = msgspec.json.decode(path.read_bytes())
-    return Certificate(**{name: _entry(numbers, **entries[name]) for name in Certificate._fields})
-
-
-def _entry(
-    kind: Callable[..., Any], scale: float, numbers: dict[str, Any], proof: dict[str, Any], margins: dict[str, float]
-) -> ProofEntry:
-    P, multipliers, sizes = (np.array(proof[name]) for name in ("P", "multipliers", "sizes"))
-    return ProofEntry(scale, kind(**numbers), Proof(P, multipliers, sizes, proof["ratio"]), margins)
-
-
 def _checked(law: CertifiedLaw, name: str, scale: float, proof: Proof) -> ProofEntry:
     numbers = law.numbers_at(scale)
     margins = margins_of(law, name, numbers, proof)

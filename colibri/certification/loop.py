@@ -31,18 +31,13 @@ class RangeError(Error):
 
 
 class UncertainLoop(NamedTuple):
-    """A closed loop of n states, m rows of ξ and k channels.
+    """A closed loop of n states, m rows of ξ and k channels."""
 
-    Attributes:
-        vertices, entries, channels: A, (v, n, n), E, (n, m), and Y, (k, n).
-        gains, offsets: N, (m, k), and D, (m,), not negative.
-    """
-
-    vertices: AnyArray
-    entries: AnyArray
-    channels: AnyArray
-    gains: AnyArray
-    offsets: AnyArray
+    vertices: AnyArray  # A, (v, n, n)
+    entries: AnyArray  # E, (n, m)
+    channels: AnyArray  # Y, (k, n)
+    gains: AnyArray  # N, (m, k), not negative
+    offsets: AnyArray  # D, (m,), not negative
     disturbance: AnyArray  # b, (n, d)
     limits: AnyArray  # rows f, (l, n): |f z| <= 1
     starts: AnyArray  # desired starts, (s, n), each along one axis

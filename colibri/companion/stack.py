@@ -104,16 +104,13 @@ class Response(NamedTuple):
     """Response of body rates, a lag of first or second order, and of thrust, of first order.
 
     Assumed time constants are short: too long a one costs stability, too short a one only bandwidth.
-
-    Attributes:
-        max_rate_rad_s, max_acceleration_rad_s2: Limits in the stack.
     """
 
     time_constant_s: Vector  # the rate loop demands the acceleration (command - rate) / time constant
     latency_s: float  # from a command's arrival to its first effect
     thrust_lag_s: float
-    max_rate_rad_s: Vector
-    max_acceleration_rad_s2: Vector
+    max_rate_rad_s: Vector  # limit in the stack
+    max_acceleration_rad_s2: Vector  # limit in the stack
     acceleration_lag_s: Vector = (0.0, 0.0, 0.0)  # 0 for first order
 
 

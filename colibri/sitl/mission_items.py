@@ -15,17 +15,11 @@ Corner: TypeAlias = tuple[float, float]
 
 
 class Item(NamedTuple):
-    """An item of a plan.
+    """An item of a plan."""
 
-    Attributes:
-        command: MAV_CMD.
-        params: The first parameters; others are 0.
-        place: East, north, and height above home, m.
-    """
-
-    command: int
-    params: tuple[float, ...] = ()
-    place: Place | None = None
+    command: int  # MAV_CMD
+    params: tuple[float, ...] = ()  # the first parameters; others are 0
+    place: Place | None = None  # east, north, and height above home, m
 
     def on_wire(self, origin: Geodetic) -> MissionItem:
         p1, p2, p3, p4 = (*self.params, *(0.0,) * (4 - len(self.params)))

@@ -46,15 +46,10 @@ _FIRST_STICKS_S = 0.2
 
 
 class Links(NamedTuple):
-    """Link faults.
+    """Link faults."""
 
-    Attributes:
-        ground: Between the vehicle and all ground stations, in simulated time.
-        plant: Between plant and autopilot; the flight stays the same, as frames are repeated.
-    """
-
-    ground: Trouble
-    plant: Trouble
+    ground: Trouble  # between the vehicle and all ground stations, in simulated time
+    plant: Trouble  # between plant and autopilot; the flight stays the same, as frames are repeated
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(unknown("link", name, self._fields))

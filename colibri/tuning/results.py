@@ -34,11 +34,7 @@ _STREAM = 1
 
 
 class Compared(NamedTuple):
-    """One number before and after, for one combination or `all`.
-
-    Attributes:
-        low, high: Bounds at 95 % confidence: bootstrap over seeds, in pairs.
-    """
+    """One number before and after, for one combination or `all`."""
 
     what: str
     where: str
@@ -46,7 +42,7 @@ class Compared(NamedTuple):
     before: float
     after: float
     change: float  # relative to `before`; absolute for a share, or if a resampled `before` is zero
-    low: float
+    low: float  # bounds at 95 % confidence: bootstrap over seeds, in pairs
     high: float
     is_relative: bool
     is_objective: bool

@@ -19,11 +19,7 @@ class ViewError(Error):
 
 
 class VehicleShape(NamedTuple):
-    """The geometry of a vehicle.
-
-    Attributes:
-        rotors_m: x forward, y left of each rotor.
-    """
+    """The geometry of a vehicle; `rotors_m` are x forward and y left of each rotor."""
 
     rotors_m: tuple[tuple[float, float], ...] = ((0.17, -0.17), (-0.17, 0.17), (0.17, 0.17), (-0.17, -0.17))
     spins: PerRotor = (1.0, 1.0, -1.0, -1.0)  # 1.0 counter-clockwise from above, -1.0 clockwise

@@ -124,12 +124,7 @@ _WINDOWS = 2
 
 
 class Consistency:
-    """Integrates body rates and velocity over windows.
-
-    Attributes:
-        contradiction: In words, or empty.
-        jumped_m: Largest jump of the position, until its reader clears it.
-    """
+    """Integrates body rates and velocity over windows; `jumped_m` is the largest jump until its reader clears it."""
 
     def __init__(self) -> None:
         self.contradiction, self.jumped_m = "", 0.0

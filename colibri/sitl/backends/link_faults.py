@@ -24,23 +24,14 @@ _MAX = {"loss": 1.0, "delay_s": inf, "jitter_s": inf, "duplicate": 1.0, "reorder
 
 @dataclass(slots=True)
 class Trouble:
-    """The faults of a link, drawn for each datagram; may be changed at any time.
+    """The faults of a link, drawn for each datagram; may be changed at any time."""
 
-    Attributes:
-        loss: Fraction of datagrams lost.
-        delay_s: Delay of each datagram.
-        jitter_s: Largest additional delay.
-        duplicate: Fraction delivered twice, the copy with its own delay.
-        reorder: Fraction delayed so that later ones overtake.
-        corrupt: Fraction with a wrong bit.
-    """
-
-    loss: float = 0.0
-    delay_s: float = 0.0
-    jitter_s: float = 0.0
-    duplicate: float = 0.0
-    reorder: float = 0.0
-    corrupt: float = 0.0
+    loss: float = 0.0  # fraction of datagrams lost
+    delay_s: float = 0.0  # delay of each datagram
+    jitter_s: float = 0.0  # largest additional delay
+    duplicate: float = 0.0  # fraction delivered twice, the copy with its own delay
+    reorder: float = 0.0  # fraction delayed so that later ones overtake
+    corrupt: float = 0.0  # fraction with a wrong bit
     down: bool = False
 
     def __setattr__(self, name: str, value: float) -> None:

@@ -33,12 +33,7 @@ _GIVE_UP_S = 200.0
 
 
 class LockstepSession:
-    """A flight that is stepped; `truth` is the true state now.
-
-    Attributes:
-        acks: Answers of the plant to commands: number and MAV_RESULT.
-        trouble: Faults of the link between plant and autopilot.
-    """
+    """A flight that is stepped; `truth` is the true state now, `acks` are the plant's answers: number, MAV_RESULT."""
 
     def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, rotors: int, seed: int = 0) -> None:
         self.plant, self._rotors = plant, rotors

@@ -9,7 +9,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
-from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
+from colibri.certification.attitude import CertifiedConditions
 from colibri.certification.certificate import Certificate, ProofEntry
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
@@ -17,13 +17,14 @@ from colibri.certification.report import CERTIFICATE, FIGURE, Interval, fly, int
 from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.certificates import read_certificate
 from tests.support.commands import Refused
 
 HERE = Path(__file__).parent
 CONDITIONS, VEHICLE = CertifiedConditions(0.01, 0.5), load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
 FLIGHT = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
-CERTIFIED = certificates.read(HERE / "lpv-mpc.json", AttitudeNumbers)
+CERTIFIED = read_certificate(HERE / "lpv-mpc.json")
 """Of profile flight, as `colibri certify` wrote it."""
 
 
@@ -166,7 +167,7 @@ def left_after(law: PlannedAttitude, error: float) -> float:
 def test_profile_flight_is_certified(tmp_path: Path) -> None:
     arguments = ["certify", "flight", "--flights", "100", "--out", str(tmp_path), "--quiet"]
     assert main(arguments) == 0
-    again = certificates.read(tmp_path / CERTIFICATE, AttitudeNumbers)
+    again = read_certificate(tmp_path / CERTIFICATE)
     assert again.largest.scale == pytest.approx(CERTIFIED.largest.scale, abs=0.02)
     for part in ("invariant", "attractor"):
         then, now = (getattr(each, part).proof.reach(np.eye(12)) for each in (CERTIFIED, again))

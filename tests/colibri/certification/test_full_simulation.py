@@ -16,7 +16,7 @@ from colibri.autopilot.control.lpv_mpc.mpc import Plan as QpPlan
 from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification import certificate as certificates
-from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
+from colibri.certification.attitude import CertifiedConditions
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.certification.report import fly
 from colibri.common.jit import packed
@@ -26,6 +26,7 @@ from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import fixed_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.certificates import read_certificate
 
 VEHICLE, CONDITIONS = load_vehicle("hummingbird"), CertifiedConditions(0.01, 0.5)
 HOVER_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
@@ -66,7 +67,7 @@ def remembered(memory: lpv_mpc.LawMemory) -> Array:
 
 
 def invariant() -> certificates.ProofEntry:
-    return certificates.read(Path(__file__).parent / f"{NAME}.json", AttitudeNumbers).invariant
+    return read_certificate(Path(__file__).parent / f"{NAME}.json").invariant
 
 
 def disturbances(entry: certificates.ProofEntry, kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
