@@ -22,7 +22,7 @@ INSIDE = {
     "NoEffectWarning": "a warning, which ends nothing",
     "Refused": "a setpoint that is not flown is counted",
     "_CompiledElsewhereError": "a kernel is interpreted instead, in the same file",
-    "_RefusedError": "a file operation's way out, answered in the same file",
+    "NakError": "a refusal of the file service, answered by it",
 }
 """Exceptions that are no error for a user."""
 

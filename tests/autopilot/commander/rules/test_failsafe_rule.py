@@ -195,4 +195,4 @@ def test_rows_say_what_they_add_to_a_warning() -> None:
 def test_the_page_is_current() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert page == with_tables(page, tables())
-    assert f"ground station lost` once the condition has not held for {CLEAR_AFTER_US * 1e-6:g} s" in page
+    assert f"ground station lost` {CLEAR_AFTER_US * 1e-6:g} s after the end of the condition" in page
