@@ -138,10 +138,7 @@ class FigureSeries:
         self._newest = rows[-2:].copy()
 
     def over_time(self) -> Series:
-        """Return columns, angles in degrees, and derived series.
-
-        Velocities are ENU, m/s; `ex` to `ez` are errors, m, `distance` their norm, and `rms` its RMS once settled.
-        """
+        """Return columns, angles in degrees, velocities, ENU, errors, their norm `distance`, its RMS once settled."""
         series = _columns(self._names, [*self._start, *self._later.points(), self._newest[-1:]])
         t = series["t"]
         rms = np.sqrt(self._squares_m2 / self._settled) if t[-1] > SETTLED_AFTER_S else np.nan

@@ -59,10 +59,7 @@ def positive_margin(M: AnyArray) -> float:
 
 
 def is_positive(M: AnyArray) -> bool:
-    """Prove that M is symmetric and positive definite.
-
-    With X an approximate inverse factor, X M Xᵀ is strictly diagonally dominant in integers (Gershgorin).
-    """
+    """Prove M positive definite: with X near an inverse factor, X M Xᵀ is strictly diagonally dominant (Gershgorin)."""
     if not (M == M.T).all():
         return False
     try:
@@ -128,11 +125,7 @@ class Certificate(NamedTuple):
 
 
 def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:
-    """Certify a law down to a scale of `least`.
-
-    Raises:
-        NotCertifiedError: A part is not proven.
-    """
+    """Certify a law down to a scale of `least`; `NotCertifiedError` if a part is not proven."""
     say("the largest ranges")
     found = lyapunov.largest_scale(lambda scale: _loop_at(law, scale), least)
     if found is None:

@@ -31,10 +31,7 @@ class Inequality(NamedTuple):
 
 
 def minimise(cost: Array, always: Sequence[Inequality], many: Inequality | None = None) -> Array | None:
-    """Return the x of least cost; `None` if Clarabel finds none.
-
-    `many` is a stack of inequalities, added as they are violated: few bind.
-    """
+    """Return the x of least cost, if there is one; of the stack `many`, violated inequalities are added: few bind."""
     total = 0 if many is None else len(many.constant)
     taken = list(range(0, total, max(1, total // _ADDED)))
     for _ in range(_MAX_ROUNDS):

@@ -63,10 +63,7 @@ class Interval(NamedTuple):
 
 
 def fly(law: PlannedAttitude, entry: ProofEntry, flights: int, duration_s: float, *, seed: int) -> FlownErrors:
-    """Fly from the border V = 1 to attitudes that may be held, under the largest disturbance.
-
-    The moment is constant, random, at the resonance, or the worst for V.
-    """
+    """Fly from V = 1 to attitudes that may be held, under moments constant, random, resonant, or the worst for V."""
     numbers, proof = entry.numbers, entry.proof
     rng = np.random.default_rng(seed)
     z = np.linalg.solve(np.linalg.cholesky(proof.P).T, _directions(rng, flights, STATES + INPUTS).T).T * _INSIDE

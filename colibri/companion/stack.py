@@ -101,10 +101,7 @@ class ParameterRule(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Response of body rates, a lag of first or second order, and of thrust, of first order.
-
-    Assumed time constants are short: too long a one costs stability, too short a one only bandwidth.
-    """
+    """Response of body rates and thrust; a time constant too long costs stability, one too short only bandwidth."""
 
     time_constant_s: Vector  # the rate loop demands the acceleration (command - rate) / time constant
     latency_s: float  # from a command's arrival to its first effect

@@ -42,8 +42,7 @@ def judge_race(
 ) -> tuple[float, int, int]:
     """Return reward, end and gates passed of a vehicle that was at `before`, ENU; gate k is the next.
 
-    Args:
-        gates: Centre and direction, ENU, and distance from the gate before, m, (m, 7); the last has length 0.
+    `gates` are centre and direction, ENU, and distance from the gate before, m, (m, 7); the last has length 0.
     """
     begun, now, ahead, behind, rate = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):

@@ -108,10 +108,7 @@ class PilotedEpisodes(Episodes):
         return SteppedFlight(builder.build(feedback, autopilot.frame_interval_us), autopilot, Direct())
 
     def _in_step(self, profile: Profile) -> Profile:
-        """Return the profile with a control interval that divides that of the actions, as close as possible to its own.
-
-        Only the estimator has a frame between two control samples.
-        """
+        """Return the profile with the control interval nearest to its own that divides that of the actions."""
         law, interval_ms = profile.controller, round(self.interval_s * 1e3)
         own_s = profile.table(law).get("control_interval_s", 1.0)
         simulation = structs.replace(profile.simulation, frame_interval_s=None)
@@ -119,7 +116,7 @@ class PilotedEpisodes(Episodes):
             return structs.replace(profile, simulation=simulation)
         fitting = [ms for ms in range(1, interval_ms + 1) if interval_ms % ms == 0]
         ms = min(fitting, key=lambda ms: (abs(ms - own_s * 1e3), -ms))
-        if self._estimates and ms % 2 == 0:
+        if self._estimates and ms % 2 == 0:  # only the estimator has a frame between two control samples
             simulation = structs.replace(simulation, frame_interval_s=0.0005 * ms)
         key = f"controllers.{law}.control_interval_s"
         alone = structs.replace(profile, simulation=structs.replace(simulation, frame_interval_s=None))

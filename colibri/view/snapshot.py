@@ -102,13 +102,7 @@ class Chart(NamedTuple):
 
 
 class Source(Protocol):
-    """A vehicle, recorded or live.
-
-    Attributes:
-        is_live: Whether time passes by itself.
-        span_s: First and last known time.
-        surroundings: A new object after each change.
-    """
+    """A vehicle, recorded or live; `surroundings` is a new object after each change."""
 
     name: str
 

@@ -84,10 +84,7 @@ class LoggedChild:
 
 @contextmanager
 def one_core(worker: int, workers: int) -> Iterator[None]:
-    """Pin this thread and its processes to one core if workers occupy all cores.
-
-    In lockstep one process computes at a time; waking another core costs much more.
-    """
+    """Pin this thread and its processes to one core if workers occupy all: in lockstep, waking another costs more."""
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
     if not cores or not workers or workers % len(cores):  # a core may be idle, or would have more to do than others
         yield
