@@ -34,8 +34,7 @@ _LOG_SCHEMA = {
     },
 }
 """Schema of `foxglove.Log`, a panel of Foxglove."""
-_LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)
-"""Foxglove's level of each severity of a status text."""
+_LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)  # Foxglove's level of each severity of a status text
 
 
 class ExportError(Error):
@@ -201,8 +200,7 @@ def _schema(tree: Any, types: list[np.dtype[Any]]) -> dict[str, Any]:
     return {"type": "object", "properties": {name: _schema(part, types) for name, part in tree.items()}}
 
 
-_MOST_LETTERS = 63
-"""Of a name in MATLAB."""
+_MOST_LETTERS = 63  # of a name in MATLAB
 
 
 def write_mat(log: "ULog", path: Path, to: Path) -> Path:

@@ -32,10 +32,8 @@ _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
 _NOTHING = 1e-12
-_PLAIN = (-2, 4)
-"""Powers of ten written without exponent."""
-_PNG_LEVEL = 3
-"""Takes half of the time of the usual 6."""
+_PLAIN = (-2, 4)  # powers of ten written without exponent
+_PNG_LEVEL = 3  # takes half of the time of the usual 6
 _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 

@@ -13,8 +13,7 @@ from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import Vehicle
 
-_ABOVE_GROUND_M = 0.1
-"""Below a higher reference the ground must not be touched."""
+_ABOVE_GROUND_M = 0.1  # below a higher reference the ground must not be touched
 _WINDOW_S = 1.0
 _GRAVITY_M_S2 = 9.81
 
@@ -117,13 +116,11 @@ def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:
 
 LOST_M = 5.0
 """A settled vehicle further from its reference is lost."""
-_TOUCHED_S = 1.0
-"""Longest contact with the ground below the reference."""
+_TOUCHED_S = 1.0  # longest contact with the ground below the reference
 _LAST_PART = 2.0 / 3.0
 LIMIT_CYCLE_RAD_S = 1.5
 """A swing above it is a limit cycle; rotors slower than assumed cause 3 to 8 rad/s."""
-_TURNING_S = 1.0
-"""A recovery may be upside down for so long."""
+_TURNING_S = 1.0  # a recovery may be upside down for so long
 _INSTANT_S = 1e-6
 
 

@@ -30,8 +30,7 @@ from colibri.mavlink.ulog.log import TopicReader
 Report: TypeAlias = dict[str, Any]
 
 _SMALL_M = 0.01
-_INSTANT_S = 1e-6
-"""Times are whole microseconds."""
+_INSTANT_S = 1e-6  # times are whole microseconds
 
 
 def report(

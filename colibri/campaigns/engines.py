@@ -39,8 +39,7 @@ class Engine(Protocol):
         """Yield each job with its result, in order of completion; `work` and `common` are pickled."""
 
 
-_AHEAD = 2
-"""Jobs submitted per worker, so that no worker waits."""
+_AHEAD = 2  # jobs submitted per worker, so that no worker waits
 _NO_GUARD = 'worker processes cannot load the script: flights must begin under `if __name__ == "__main__":`'
 
 
@@ -98,8 +97,7 @@ class Pool:
         return broken
 
 
-_given: tuple[Callable[[Any, Any], Any], Any]
-"""In a worker: the function and its common argument."""
+_given: tuple[Callable[[Any, Any], Any], Any]  # in a worker: the function and its common argument
 
 
 def _begin(packed: bytes, has_begun: Any) -> None:
@@ -155,10 +153,8 @@ def with_bar(done: Iterable[Done], title: str, total: int, *, quiet: bool) -> Ge
 
 _PACKAGE = "colibri-sitl"
 CONNECT_S = 10.0
-_BATCHES_AHEAD = 3
-"""Batches submitted per core, so that no worker waits for the scheduler."""
-_BATCH_S = 2.0
-"""Target duration of a batch: the scheduler takes about 200 µs a task."""
+_BATCHES_AHEAD = 3  # batches submitted per core, so that no worker waits for the scheduler
+_BATCH_S = 2.0  # target duration of a batch: the scheduler takes about 200 µs a task
 _MAX_BATCH = 500
 
 

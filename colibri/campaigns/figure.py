@@ -18,13 +18,10 @@ from colibri.flights.spec import FlightSpec
 
 COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
 _LOST = "#D00000"
-_CONTINUOUS = 3
-"""Least number of values of a factor that is drawn along an axis."""
+_CONTINUOUS = 3  # least number of values of a factor that is drawn along an axis
 _MAX_CURVES, _MAX_STRIPS, _MAX_DRAWN = len(COLORS), 40, 3
-_CHARACTER_IN = 0.085
-"""Largest width of a character of a row's name."""
-_WIDE_SPREAD = 20.0
-"""Ratio of largest to smallest value from which the axis is logarithmic."""
+_CHARACTER_IN = 0.085  # largest width of a character of a row's name
+_WIDE_SPREAD = 20.0  # ratio of largest to smallest value from which the axis is logarithmic
 _PANEL_IN, _MAP_IN = 2.6, 3.4
 
 _UNITS = dict(

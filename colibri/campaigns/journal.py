@@ -2,10 +2,11 @@
 
 import os
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from inspect import getsource
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Any
 
 import msgspec
 
@@ -21,7 +22,7 @@ from colibri.flights.provenance import hash_of
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     def __init__(self, folder: Path, kept: dict[int, FlightResult], file: str = JOURNAL) -> None:
         self.kept = kept
         self._folder = folder
@@ -35,9 +36,6 @@ class Journal:
         self._file.flush()
         os.fsync(self._file.fileno())
         self.kept[flown.flight] = kept
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()

@@ -31,10 +31,8 @@ _SIGNS = (-1, 1)
 MIRRORS = ((-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1), (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1))
 """Signs of the states under exchange of left and right, and of fore and aft."""
 
-_HALF_A_TURN = 4
-"""Half a turn or more, rad."""
-_STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
-"""phi, theta, psi, rad, to p, q, r, rad/s."""
+_HALF_A_TURN = 4  # half a turn or more, rad
+_STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)  # phi, theta, psi, rad, to p, q, r, rad/s
 
 Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""

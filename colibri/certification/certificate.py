@@ -15,8 +15,7 @@ from colibri.common.errors import Error
 from colibri.common.types import Array
 
 _ONE = np.array([Fraction(1)], dtype=object)
-_BITS = 40
-"""Precision of a factor's entries."""
+_BITS = 40  # precision of a factor's entries
 
 
 def exactly(value: float) -> Fraction:
@@ -88,8 +87,7 @@ def _fractions(values: Array) -> Any:
     return np.vectorize(exactly, otypes=[object])(values)
 
 
-_WORKING_PART = 0.5
-"""Part of the largest scale; near it decay is slow."""
+_WORKING_PART = 0.5  # part of the largest scale; near it decay is slow
 _DIGITS = 4
 
 

@@ -22,8 +22,7 @@ AnyArray: TypeAlias = NDArray[Any]
 Number: TypeAlias = Callable[[float], Any]
 """`float`, or `fractions.Fraction`."""
 
-_DIGITS = 9
-"""Precision of comparisons of floats."""
+_DIGITS = 9  # precision of comparisons of floats
 
 
 class RangeError(Error):

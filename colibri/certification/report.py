@@ -38,8 +38,7 @@ from colibri.flights.folder import occupied
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 _SUBSTEPS = 4
-_RESONANCE_RAD_S = 28.0
-"""Of roll and pitch in profile flight."""
+_RESONANCE_RAD_S = 28.0  # of roll and pitch in profile flight
 _KINDS = 4
 _INSIDE = 1.0 - 1e-9
 _NO_LENGTH = 1e-12
@@ -186,8 +185,7 @@ def _unit(state: int) -> float:
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
 LAW = "lpv-mpc"
 _DURATION_S = 1.0
-_SEEN = 1e-12
-"""Smallest eigenvalue of a weight over its largest that counts."""
+_SEEN = 1e-12  # smallest eigenvalue of a weight over its largest that counts
 _NOT_PROVEN = (
     "limits that bind",
     "references that move",

@@ -32,14 +32,11 @@ from colibri.plant.vehicle.description import Vehicle
 
 _GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
 """Assumed until the stack is recognised."""
-_STEADY_US = 1_000_000
-"""Hold after the take-over, and streaming before it."""
-_BRAKES_US = 3_000_000
-"""Longest braking before the hand-over."""
+_STEADY_US = 1_000_000  # hold after the take-over, and streaming before it
+_BRAKES_US = 3_000_000  # longest braking before the hand-over
 _SLOW_M_S = 0.3
 _UP_M, _UP_M_S = 0.5, 0.3
-_CORRECTED_IN = 0.5
-"""Time constant of the prediction's correction, in round trips."""
+_CORRECTED_IN = 0.5  # time constant of the prediction's correction, in round trips
 
 
 class Companion:

@@ -15,15 +15,12 @@ from colibri.companion.stack import CompanionError, Response, response_text
 _GRID_S = 0.002
 MAX_LATENCY_S = 0.12
 _LATENCIES = round(MAX_LATENCY_S / _GRID_S)
-_NEAR = 6
-"""Latencies refined on either side of the table's best."""
+_NEAR = 6  # latencies refined on either side of the table's best
 _TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 36)
 _ACCELERATION_LAGS_S = np.geomspace(0.008, 0.15, 10)
 _FIRST_ORDER = np.zeros(1)
-_LEAST_LAG_S = 0.004
-"""A shorter lag of the acceleration counts as zero."""
-_CLEARLY_LESS = 0.9
-"""Largest ratio of unexplained variances that justifies the second order."""
+_LEAST_LAG_S = 0.004  # a shorter lag of the acceleration counts as zero
+_CLEARLY_LESS = 0.9  # largest ratio of unexplained variances that justifies the second order
 _LEAST_SAMPLES = 200
 MIN_EXPLAINED = 0.5
 

@@ -10,12 +10,10 @@ from colibri.mavlink.client.conversation import UNANSWERED
 from colibri.mavlink.client.modes import FlightMode
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_TEMPORARILY_REJECTED, mav
 
-_STREAMS_FIRST_US = 1_000_000
-"""PX4 requires setpoints before offboard mode."""
+_STREAMS_FIRST_US = 1_000_000  # PX4 requires setpoints before offboard mode
 _HOLD_TRIES = 3
 _AGAIN_US = 400_000
-_ABOVE_SEA = -1.0
-"""Pitch, as sent by QGroundControl; PX4 ignores it."""
+_ABOVE_SEA = -1.0  # pitch, as sent by QGroundControl; PX4 ignores it
 _LEAST_HEIGHT_M = 1.0
 
 

@@ -23,8 +23,7 @@ from colibri.mavlink.wire.places import misplaced
 
 SUFFIX = ".plan"
 _EAST_DEG = 90.0
-_MOST = 1e6
-"""Limit of numbers, and of the mission's duration in seconds."""
+_MOST = 1e6  # limit of numbers, and of the mission's duration in seconds
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _ENDS = {mav.MAV_CMD_NAV_LAND: "landing", mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "return"}
 

@@ -40,10 +40,8 @@ LOG, REPORT, RESPONSE, FIGURE = "companion.csv", "report.json", "companion.toml"
 _POLL_S = 0.002
 _IDENTIFIES_AT_M = 3.0
 _SAY_FAILING_EVERY_S = 5.0
-_MAX_IGNORED = 5
-"""Of more strangers nothing is said."""
-_SILENT_S = 3.0
-"""Silence after which the vehicle may have another address."""
+_MAX_IGNORED = 5  # of more strangers nothing is said
+_SILENT_S = 3.0  # silence after which the vehicle may have another address
 
 
 class CompanionFlight(NamedTuple):

@@ -81,8 +81,7 @@ class FlightSummary:
                 self.fallbacks[fallback] += 1
 
 
-_PULL_1_S = 1.0
-"""Gain of the position error in a velocity setpoint."""
+_PULL_1_S = 1.0  # gain of the position error in a velocity setpoint
 
 
 def message_of(

@@ -138,8 +138,7 @@ class Stack:
 
 OFFBOARD, HOLD, LAND = PX4_MODES["Offboard"], PX4_MODES["Hold"], PX4_MODES["Land"]
 _GUIDED, _LOITER, _COPTER_LAND, _BRAKE = (COPTER_MODES[name] for name in ("Guided", "Loiter", "Land", "Brake"))
-_THRUST_AS_THRUST = 8
-"""Bit 3 of GUID_OPTIONS; without it a thrust is a climb rate."""
+_THRUST_AS_THRUST = 8  # bit 3 of GUID_OPTIONS; without it a thrust is a climb rate
 _STATUS_HZ = {"EXTENDED_SYS_STATE": 5.0, "SYS_STATUS": 5.0, "BATTERY_STATUS": 1.0, "GLOBAL_POSITION_INT": 5.0}
 _PX4_STATUS_HZ = {"CURRENT_MODE": 25.0, "ESTIMATOR_STATUS": 5.0, **_STATUS_HZ}
 

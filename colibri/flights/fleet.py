@@ -37,8 +37,7 @@ _COLUMNS = dict(id=3, time=6, real=6, mode=10, rotors=8, east=6, north=6, up=7, 
 """Least widths: enough for usual values, so that columns stay in place."""
 _FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real", "solver")
 """Columns by priority, for a narrow terminal."""
-_LINKS_WIDTH = 66
-"""Below this width, links are shown without scheme and rates."""
+_LINKS_WIDTH = 66  # below this width, links are shown without scheme and rates
 
 
 class StatusLines:

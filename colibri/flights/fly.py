@@ -11,8 +11,7 @@ from colibri.flights.plan import FlightPlan, FrameCount, PlanError, unseen
 from colibri.flights.provenance import write_provenance
 from colibri.mavlink.ulog.log import TopicLog
 
-_SHOWN = ("ground", "heard", "said")
-"""Events of the autopilot shown to a user with ground stations."""
+_SHOWN = ("ground", "heard", "said")  # events of the autopilot shown to a user with ground stations
 _STOPPED_S = 10.0
 _SILENT_S = 60.0
 _BY_SIGNAL = 128

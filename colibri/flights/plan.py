@@ -46,8 +46,7 @@ class PlanError(Error):
     """Options that cannot be combined."""
 
 
-_ALIKE_DEG, _SECTORS = 45.0, 8
-"""Bearings of rotors are compared to the nearest eighth of a turn."""
+_ALIKE_DEG, _SECTORS = 45.0, 8  # bearings of rotors are compared to the nearest eighth of a turn
 
 
 class Contents(NamedTuple):

@@ -35,10 +35,8 @@ from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 from colibri.plant.vehicle.description import load_vehicle
 
-_CUT_OFF_US = 1_000_000
-"""Largest difference of the logs' ends if the processes are killed."""
-_NO_CLOCK_S = 0.0
-"""The wall clock of a replay; decisions must not depend on it."""
+_CUT_OFF_US = 1_000_000  # largest difference of the logs' ends if the processes are killed
+_NO_CLOCK_S = 0.0  # the wall clock of a replay; decisions must not depend on it
 
 
 class Answer(NamedTuple):

@@ -169,8 +169,7 @@ _STATELESS_PACKAGES = (
     *("numba", "_nrt_python", "onnxruntime", "llvmlite", "msgspec", "re"),
     *("_struct", "ctypes", "_ctypes", "weakref", "numpy", "_thread"),
 )
-_HEAP_TYPE = 1 << 9
-"""Flag of a class written in Python."""
+_HEAP_TYPE = 1 << 9  # flag of a class written in Python
 _KINDS: dict[type, Keep] = {}
 
 

@@ -112,8 +112,7 @@ def tilt_deg(flown: Columns) -> NDArray[np.float64]:
     return np.asarray(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))
 
 
-_MAX_TEXTS = 18
-"""Lines that fit below the view from above; the last ones are shown."""
+_MAX_TEXTS = 18  # lines that fit below the view from above; the last ones are shown
 _ROOM_FOR_LEGEND = 0.15
 _END_COLOUR = "tab:red"
 

@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Self
+from typing import Any
 
 from colibri.common.process.lifecycle import freeze_once
 from colibri.common.spec import values_of
@@ -21,7 +21,7 @@ from colibri.sitl.stepping import Stepped
 from colibri.sitl.vehicle import Sitl
 
 
-class Flights:
+class Flights(AbstractContextManager["Flights"]):
     """All flights of a test; they end with it.
 
     Attributes:
@@ -91,9 +91,6 @@ class Flights:
             "simulated_s": sum(sitl.time_s for sitl in self.flown),
             "sha256": [sitl.sha256 for sitl in self.flown],
         }
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._ends.close()

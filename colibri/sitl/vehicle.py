@@ -39,10 +39,8 @@ READY_WITHIN_S = 40.0
 CALM = "0@0"
 STICKS_EVERY_US = 40_000
 """25 Hz, as QGroundControl sends a joystick's."""
-_SETTABLE = ("payload_kg", "wind")
-"""Attributes that tests may assign."""
-_FIRST_STICKS_S = 0.2
-"""Time to get first sticks through a faulty link."""
+_SETTABLE = ("payload_kg", "wind")  # attributes that tests may assign
+_FIRST_STICKS_S = 0.2  # time to get first sticks through a faulty link
 
 
 class Links(NamedTuple):

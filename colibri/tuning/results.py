@@ -29,8 +29,7 @@ ALL = "all"
 """All combinations of the grid."""
 _RESAMPLES = 10_000
 _CONFIDENCE = (0.025, 0.975)
-_STREAM = 1
-"""Random stream of the bootstrap."""
+_STREAM = 1  # random stream of the bootstrap
 
 
 class Compared(NamedTuple):

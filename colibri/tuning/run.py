@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path, PurePath
@@ -34,7 +35,7 @@ class Scale(NamedTuple):
     each: tuple[tuple[float, ...], ...]
 
 
-class TrialFlights:
+class TrialFlights(AbstractContextManager["TrialFlights"]):
     """Flies with an engine that is kept between trials; iterates over its jobs."""
 
     def __init__(self, engine: Engine, common: Common) -> None:
@@ -53,9 +54,6 @@ class TrialFlights:
         if not self._left:
             raise StopIteration
         return self._left.popleft()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_error: object) -> None:
         self._flown.close()

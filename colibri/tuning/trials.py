@@ -3,7 +3,7 @@
 import fcntl
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from time import sleep
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
@@ -73,8 +73,7 @@ _PACKAGE = "colibri-sitl"
 JOURNAL, _LOCKS = "trials.log", "locks"
 _NUMBER, _PROCESS, _FLIGHTS, _LOST, _PRUNED = "number", "process", "flights", "lost", "pruned"
 _POLL_S = 0.2
-_MAX_P = 0.05
-"""A worse trial is pruned at this significance level."""
+_MAX_P = 0.05  # a worse trial is pruned at this significance level
 _BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
@@ -96,7 +95,7 @@ class Begun(NamedTuple):
     trial: "Trial"
 
 
-class Trials:
+class Trials(AbstractContextManager["Trials"]):
     """The trials of a tuning in a folder, shared by processes.
 
     Each holds a lock that ends with it, so that others repeat its unfinished trials. A trial depends on earlier trials,
@@ -122,9 +121,6 @@ class Trials:
                 pruner=optuna.pruners.WilcoxonPruner(p_threshold=_MAX_P) if tuning.prune_after else None,
                 load_if_exists=True,
             )
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_error: object) -> None:
         self._held.release()

@@ -19,12 +19,9 @@ _SCALE: tuple[tuple[float, Colour], ...] = (
     (0.7, (240, 200, 40)),
     (1.0, (220, 40, 40)),
 )
-_MAX_ARROW = 3.0
-"""Length of an arrow at top speed, in radii of the rotor."""
-_TURNS_A_SECOND = 1.5
-"""Displayed rate at top speed; the true one would alias."""
-_EDGES = 4
-"""Upright lines of a circular zone."""
+_MAX_ARROW = 3.0  # length of an arrow at top speed, in radii of the rotor
+_TURNS_A_SECOND = 1.5  # displayed rate at top speed; the true one would alias
+_EDGES = 4  # upright lines of a circular zone
 
 
 def rotor_colour(part: float) -> Colour:

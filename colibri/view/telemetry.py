@@ -21,8 +21,7 @@ CHART_S = 60.0
 TRAIL_POINTS = 600
 TEXTS = 4
 _ROW_S = 0.1
-_STALE_S = 3.0
-"""Age from which values are hidden."""
+_STALE_S = 3.0  # age from which values are hidden
 _PULSE_US = (1000.0, 2000.0)
 _E7 = 1e7
 _USUAL_ROTORS, _MOST_ROTORS = 4, 8

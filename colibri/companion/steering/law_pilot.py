@@ -39,11 +39,9 @@ APPROACH = Limits(
     speed_m_s=2.0, climb_m_s=1.0, sink_m_s=1.0, acceleration_m_s2=2.0, lift_m_s2=2.0, jerk_m_s3=8.0, yaw_rate_rad_s=0.8
 )
 """Limits on the way to the track."""
-_MAX_INTERVAL_US = 10_000
-"""Setpoints are sent at 100 Hz or more."""
+_MAX_INTERVAL_US = 10_000  # setpoints are sent at 100 Hz or more
 _THERE_M, _THERE_M_S = 0.002, 0.005
-_YAW_1_S = 2.0
-"""Gain of the heading error."""
+_YAW_1_S = 2.0  # gain of the heading error
 _MIN_UPRIGHT = 0.2
 _NO_DISTURBANCE = np.zeros(6)
 

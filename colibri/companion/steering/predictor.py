@@ -144,8 +144,7 @@ def _push(y: Array, lift: float, disturbance: Array, drag: Array, gravity_m_s2: 
         y[3 + i] += h * a
 
 
-_AS_TUNED_S = 0.06
-"""Largest delay of a law as tuned."""
+_AS_TUNED_S = 0.06  # largest delay of a law as tuned
 _MOST = 1.6
 _WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
 """Power of the slowness in each weight."""
@@ -178,24 +177,18 @@ def slowed(profile: Profile, response: Response) -> Profile:
     return profile
 
 
-_FOLLOWS_US = 150_000
-"""A longer gap resets the disturbances."""
+_FOLLOWS_US = 150_000  # a longer gap resets the disturbances
 _KEPT_US = 1_000_000
-_DRIFT_1_S = 8.0
-"""PX4 spreads each GPS correction over a quarter of a second."""
+_DRIFT_1_S = 8.0  # PX4 spreads each GPS correction over a quarter of a second
 _MAX_DRIFT_M_S = 1.0
 _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
-_TURN_PART = 0.5
-"""Part of the rate error that counts as disturbance."""
-_TURN_POWER = 8.0
-"""The later the rates follow, the more of their error is the model's."""
-_CORRECTED_IN_LATENESSES = 8.0
-"""Correction time of predicted rates, in latenesses."""
+_TURN_PART = 0.5  # part of the rate error that counts as disturbance
+_TURN_POWER = 8.0  # the later the rates follow, the more of their error is the model's
+_CORRECTED_IN_LATENESSES = 8.0  # correction time of predicted rates, in latenesses
 _CORRECTED_IN_LAGS = 2.0
 """Correction time at second order, in acceleration lags: measured rates are noisier than the model is wrong."""
-_TURN_PART_OF_LAGGING = 0.05
-"""`_TURN_PART` of a response of second order."""
+_TURN_PART_OF_LAGGING = 0.05  # `_TURN_PART` of a response of second order
 _SCALE_1_S = 0.25
 MIN_SCALE, MAX_SCALE = 0.5, 1.8
 

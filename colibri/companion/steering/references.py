@@ -18,8 +18,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.client.states import TimedState
 
 OVER_S = 4.0
-_SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)
-"""Coefficients of u^5 to u^9, over u = 0..1."""
+_SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)  # coefficients of u^5 to u^9, over u = 0..1
 _FIRST_POWER = 5
 
 

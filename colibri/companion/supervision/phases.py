@@ -119,8 +119,7 @@ MAX_GAP_S, MAX_JUMP_GAP_S = 0.1, 1.0
 """States further apart are not compared, or not for jumps."""
 MAX_TURN_RAD, MAX_WAY_M = 0.15, 0.15
 """Largest contradiction in a window: 1 rad/s, 1 m/s."""
-_WINDOWS = 2
-"""A correction of the estimate contradicts once, stale values again and again."""
+_WINDOWS = 2  # a correction of the estimate contradicts once, stale values again and again
 
 
 class Consistency:

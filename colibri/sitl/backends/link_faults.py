@@ -15,8 +15,7 @@ from colibri.sitl.errors import SitlError
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 
-_HELD_BACK_S = 0.05
-"""Largest delay of a reordered datagram."""
+_HELD_BACK_S = 0.05  # largest delay of a reordered datagram
 
 _MAX = {"loss": 1.0, "delay_s": inf, "jitter_s": inf, "duplicate": 1.0, "reorder": 1.0, "corrupt": 1.0, "down": True}
 """Largest value of each fault; the smallest is 0."""

@@ -23,8 +23,7 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.errors import SitlError
 
-_STANDING = Start(psi=90.0)
-"""At rest on its feet at the origin, facing north."""
+_STANDING = Start(psi=90.0)  # at rest on its feet at the origin, facing north
 
 
 class SettingError(SitlError):

@@ -188,8 +188,7 @@ _LIMIT = "#9a9a9a"
 _NOW = "#d01080"
 _AXIS_PX = 44
 _MARK = "mark"
-_UNSEEN = -1e4
-"""So far below the scale that the line to it is vertical."""
+_UNSEEN = -1e4  # so far below the scale that the line to it is vertical
 
 
 class Plots:

@@ -23,8 +23,7 @@ KEEPS_OUT: Colour = (210, 30, 30)
 RALLY: Colour = (110, 60, 190)
 _FRONT: Colour = (220, 50, 40)
 _DARK: Colour = (60, 60, 65)
-_WIND_S = 0.4
-"""Length of the wind's arrow in time, at true size."""
+_WIND_S = 0.4  # length of the wind's arrow in time, at true size
 _ABOVE, _BELOW = (0.0, 0.0, 0.2), (0.0, 0.0, -0.2)
 _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 

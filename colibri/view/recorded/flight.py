@@ -30,8 +30,7 @@ _ROW_S = 0.02
 _TRAIL_S = 8.0
 _TRAIL_POINTS = 200
 _PATH_POINTS = 4000
-_EVENTS = 3
-"""Number of latest controller events shown."""
+_EVENTS = 3  # number of latest controller events shown
 
 
 class LogColumns(NamedTuple):

@@ -16,10 +16,8 @@ from colibri.common.errors import Error
 from colibri.common.types import Array
 from colibri.view.snapshot import NO_POINTS
 
-_STALE_S = 0.3
-"""Age from which a horizon is hidden."""
-_NICE = 15
-"""Page and browser have priority."""
+_STALE_S = 0.3  # age from which a horizon is hidden
+_NICE = 15  # page and browser have priority
 
 
 class Horizons:
