@@ -18,8 +18,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.mavlink.ulog.flight_topics import ESTIMATE, FILTER, TRUTH, Topic
 from colibri.mavlink.ulog.log import TopicReader
 
-NAVIGATION = 9
-"""Position, velocity, attitude."""
+NAVIGATION = 9  # position, velocity, attitude
 
 
 class Errors(NamedTuple):
@@ -43,8 +42,7 @@ def bounds(numbers: int, flights: int, level: float = 0.95) -> tuple[float, floa
 
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
-MEASURED = KINDS
-"""Components of each kind of measurement."""
+MEASURED = KINDS  # components of each kind of measurement
 _UPPER = np.triu_indices(NAVIGATION)
 _COVARIANCE = slice(11, 56)
 

@@ -93,12 +93,9 @@ Series: TypeAlias = dict[str, Array]
 POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
 ATTITUDE = ("phi", "theta", "psi")
-START_S = 10.0
-"""Enlarged start, kept complete."""
-MAX_POINTS = 1 << 14
-"""Points after the start: several for each pixel."""
-MAX_PATH_POINTS = 1 << 16
-"""Points of a path: for an hour, chords are off by less than a pixel."""
+START_S = 10.0  # enlarged start, kept complete
+MAX_POINTS = 1 << 14  # points after the start: several for each pixel
+MAX_PATH_POINTS = 1 << 16  # points of a path: for an hour, chords are off by less than a pixel
 
 _SLOPES = tuple(f"{name}_ref" for name in VELOCITY)
 _ERRORS = tuple(f"e{axis}" for axis in POSITION)

@@ -24,8 +24,7 @@ from colibri.flights.plan import FlightPlan
 
 GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _WIDTH_IN, _DPI = 8.6, 150
-TOP_IN = 0.8
-"""Room for a title and a row of a legend."""
+TOP_IN = 0.8  # room for a title and a row of a legend
 _LEFT_IN, _RIGHT_IN, _BOTTOM_IN = 0.85, 0.25, 0.5
 _ROW_IN, _ROW_GAP_IN, _COLUMN_GAP_IN = 1.4, 0.2, 0.95
 _TITLE_IN, _LABEL_IN = 0.45, 0.6

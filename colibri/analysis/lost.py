@@ -114,8 +114,7 @@ def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:
     return touches
 
 
-LOST_M = 5.0
-"""A settled vehicle further from its reference is lost."""
+LOST_M = 5.0  # a settled vehicle further from its reference is lost
 _TOUCHED_S = 1.0  # longest contact with the ground below the reference
 _LAST_PART = 2.0 / 3.0
 LIMIT_CYCLE_RAD_S = 1.5

@@ -28,8 +28,7 @@ INPUT = ("U1", "U2", "U3", "U4")
 ATTITUDE_REFERENCE = ("phi_ref", "theta_ref", "psi_ref")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")
 POSITION_REFERENCE = ("x_ref", "y_ref", "z_ref")
-SETTLED_AFTER_S = 20.0
-"""From then on its start no longer counts."""
+SETTLED_AFTER_S = 20.0  # from then on its start no longer counts
 COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENCE)
 _MORE_ROTORS = MORE_TRUTH.names[1:]
 

@@ -77,11 +77,9 @@ def _metric(given: Any) -> Metric:
 
 
 Logs: TypeAlias = Literal["none", "lost", "all"]
-OF_ALL = ("link",)
-"""Options that must be equal for all flights of a campaign."""
+OF_ALL = ("link",)  # options that must be equal for all flights of a campaign
 _MAX_SEED = 2**63 - 1
-MAX_UNASKED = 1_000_000
-"""Flights of a campaign without `yes`."""
+MAX_UNASKED = 1_000_000  # flights of a campaign without `yes`
 
 
 class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -181,8 +181,7 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
-SCALED = "*"
-"""Suffix of a key whose value multiplies the file's."""
+SCALED = "*"  # suffix of a key whose value multiplies the file's
 _TABLES = ("profile", "vehicle", "plant-vehicle")
 _OF_A_PROFILE = tuple(f"{key}." for key in ProfileTables.__struct_fields__)
 _NOT_FACTORS = ("seed", "link", "speed")

@@ -43,8 +43,7 @@ _GAIN_DIGITS = 8
 _MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
 _STEP = 1e-4  # step of a derivative, rad, rad/s and N m
 _SPARED = 0.2  # squared speed that moments leave to every rotor
-HELD_RAD = radians(20.0)
-"""Largest held |phi| and |theta|."""
+HELD_RAD = radians(20.0)  # largest held |phi| and |theta|
 _GRID = 4
 _BETWEEN = 1.5  # difference anywhere over the largest on a grid
 _ETA_SPARE = 1e-9

@@ -81,10 +81,8 @@ Thrust = ThrustCurve | MiddleHovers
 Parameters: TypeAlias = Mapping[str, float]
 """Parameters of the vehicle, by name."""
 
-MAX_STALE_S = 0.3
-"""Longest use of the last body rates after a companion falls silent."""
-ROUNDING = 1e-6
-"""Of single precision on the wire."""
+MAX_STALE_S = 0.3  # longest use of the last body rates after a companion falls silent
+ROUNDING = 1e-6  # of single precision on the wire
 
 
 class TakeOffOrder(Enum):

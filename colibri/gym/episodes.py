@@ -33,8 +33,7 @@ from colibri.plant.physics.world import starting_world
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 ACTIONS = ("rotors", "rates", "attitude", "velocity", "position")
-PILOTED = ACTIONS[2:]
-"""Actions through the whole autopilot."""
+PILOTED = ACTIONS[2:]  # actions through the whole autopilot
 ENDS = (
     *("", "too far from the reference", "ground", "state not finite"),
     *("action not finite", "disarmed", "gate missed", "finished"),

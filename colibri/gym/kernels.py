@@ -14,8 +14,7 @@ from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
 
 FAR, GROUND, NOT_FINITE, BAD_ACTION, DISARMED, MISSED, FINISHED = 1, 2, 3, 4, 5, 6, 7
-LOST, PASSED = -10.0, 10.0
-"""Rewards of a lost vehicle, and of a gate."""
+LOST, PASSED = -10.0, 10.0  # rewards of a lost vehicle, and of a gate
 
 
 @compiled

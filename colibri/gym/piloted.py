@@ -32,8 +32,7 @@ from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 
 OBSERVATIONS = ("truth", "estimate")
-SETTLE_S = 3.0
-"""Flown at the start of the reference, once for each environment."""
+SETTLE_S = 3.0  # flown at the start of the reference, once for each environment
 _READY_WITHIN_S = 60.0
 _COMPANION = Peer(0, 255, 190)
 _PLACES = ("x", "y", "z")

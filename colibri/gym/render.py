@@ -18,8 +18,7 @@ from colibri.mavlink.links.open import open_link
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
-_TRAIL, _LARGER = 500, 3.0
-"""Positions drawn behind the vehicle, and its size in parts of the real one."""
+_TRAIL, _LARGER = 500, 3.0  # positions drawn behind the vehicle, and its size in parts of the real one
 _HEARTBEAT_S = 1.0
 
 

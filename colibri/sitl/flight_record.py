@@ -42,8 +42,7 @@ class StatusTexts(Inbox):
 
 
 _STATE = ("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r")
-KEPT = ("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json")
-"""Files of a flight."""
+KEPT = ("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json")  # files of a flight
 PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT
 
 Columns = dict[str, NDArray[np.float64]]

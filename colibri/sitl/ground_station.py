@@ -19,8 +19,7 @@ from colibri.sitl.stepping import NotInTimeError, Stepped
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 
-AGAIN_AFTER_S = 0.5
-"""Interval of repeated requests, as in ground stations."""
+AGAIN_AFTER_S = 0.5  # interval of repeated requests, as in ground stations
 ANSWER_WITHIN_S = 15.0
 UPLOAD_WITHIN_S = 60.0
 _AGAIN_AFTER_US = round(AGAIN_AFTER_S * 1e6)

@@ -13,8 +13,7 @@ from _pytest.junitxml import xml_key
 
 from colibri.common.errors import unknown
 
-ALIKE = 0.75
-"""Similarity from which an unknown mark is taken for a typo."""
+ALIKE = 0.75  # similarity from which an unknown mark is taken for a typo
 
 
 class Signature(NamedTuple):
@@ -100,8 +99,7 @@ def _typo(mark: pytest.Mark, registered: list[str]) -> str | None:
     return option and f'unknown mark "{mark.name}" (did you mean "sitl({option}=...)"?)'
 
 
-FLOWN = "sitl_flown"
-"""Attribute of a report that holds the flights of its test."""
+FLOWN = "sitl_flown"  # attribute of a report that holds the flights of its test
 
 
 class Summary:
@@ -132,8 +130,7 @@ class Summary:
         return f"sitl: {flown}, {rate:.1f} sim-s per wall-s, verdict {self.verdict()}"
 
 
-SAID = "sitl_said"
-"""Attribute of a teardown's report that holds the text."""
+SAID = "sitl_said"  # attribute of a teardown's report that holds the text
 
 
 def attachments(kept: list[Path], folder: Path) -> str:

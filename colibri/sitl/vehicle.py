@@ -33,12 +33,10 @@ from colibri.sitl.view import View
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 
-FORCE = 21196.0
-"""Parameter of arming and disarming that overrides all checks."""
+FORCE = 21196.0  # parameter of arming and disarming that overrides all checks
 READY_WITHIN_S = 40.0
 CALM = "0@0"
-STICKS_EVERY_US = 40_000
-"""25 Hz, as QGroundControl sends a joystick's."""
+STICKS_EVERY_US = 40_000  # 25 Hz, as QGroundControl sends a joystick's
 _SETTABLE = ("payload_kg", "wind")  # attributes that tests may assign
 _FIRST_STICKS_S = 0.2  # time to get first sticks through a faulty link
 

@@ -117,8 +117,7 @@ def as_flown(values: Range, value: Any) -> Any:
 
 
 SHARE_LOST = "share_lost"
-LOST_COUNTS = 10.0
-"""A lost flight counts this many times the largest original value."""
+LOST_COUNTS = 10.0  # a lost flight counts this many times the largest original value
 _POOLINGS = ("mean", "rms", "median", "largest")
 _NOT_SMALL = ("lost_at_s",)
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
-ALL = "all"
-"""All combinations of the grid."""
+ALL = "all"  # all combinations of the grid
 _RESAMPLES = 10_000
 _CONFIDENCE = (0.025, 0.975)
 _STREAM = 1  # random stream of the bootstrap

@@ -25,12 +25,9 @@ from colibri.view.recorded.playback import Playback, speed_of
 from colibri.view.snapshot import Source, ViewError
 
 FRAMES_HZ = 30.0
-EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
-"""Rate of an exported page; lower in a long flight."""
-WORDS_HZ = 5.0
-"""Update rate of texts and time line, enough to read."""
-PLOTS_HZ = 2.0
-"""Update rate of plots, which are sent whole."""
+EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000  # rate of an exported page; lower in a long flight
+WORDS_HZ = 5.0  # update rate of texts and time line, enough to read
+PLOTS_HZ = 2.0  # update rate of plots, which are sent whole
 PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
 """Delay of the first motion after a browser's layout, or at most its connection: it slows down drawing."""
 

@@ -23,8 +23,7 @@ from colibri.plant.vehicle.description import Vehicle
 STATES, COMMANDS = 17, 4
 POSITION, VELOCITY, ATTITUDE, RATE, LIFT = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), 13
 """Lift is thrust over mass, m/s²."""
-ACCELERATION = slice(14, 17)
-"""Acceleration of the body rates, rad/s²."""
+ACCELERATION = slice(14, 17)  # acceleration of the body rates, rad/s²
 _STEP_S = 0.004
 _ROUNDING = 1e-6
 

@@ -113,8 +113,7 @@ def _between(first: Vector, second: Vector, part: float) -> Vector:
 
 
 ROUNDS = 3
-PAUSE_S = 1.2
-"""Rest between two doublets."""
+PAUSE_S = 1.2  # rest between two doublets
 
 
 class Doublet(NamedTuple):

@@ -115,10 +115,8 @@ def how_it_ended(
 
 
 WINDOW_S = 0.15
-MAX_GAP_S, MAX_JUMP_GAP_S = 0.1, 1.0
-"""States further apart are not compared, or not for jumps."""
-MAX_TURN_RAD, MAX_WAY_M = 0.15, 0.15
-"""Largest contradiction in a window: 1 rad/s, 1 m/s."""
+MAX_GAP_S, MAX_JUMP_GAP_S = 0.1, 1.0  # states further apart are not compared, or not for jumps
+MAX_TURN_RAD, MAX_WAY_M = 0.15, 0.15  # largest contradiction in a window: 1 rad/s, 1 m/s
 _WINDOWS = 2  # a correction of the estimate contradicts once, stale values again and again
 
 

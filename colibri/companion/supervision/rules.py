@@ -19,8 +19,7 @@ _MAX_APPROACH_M, _MAX_HOME_M, _MAX_JUMP_M = 50.0, 1.0, 1.0
 _MIN_HOVER, _MAX_HOVER = 0.05, 0.8
 _TRACK_POINTS = 400
 _ENDLESS_S = 100.0  # part of an endless track used for its box
-CRITICAL = frozenset({5, 6, 7, 8})
-"""MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
+CRITICAL = frozenset({5, 6, 7, 8})  # MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION
 
 
 class Age(NamedTuple):

@@ -23,8 +23,7 @@ from colibri.view.geometry import thinned
 from colibri.view.recorded.horizons import Horizons
 from colibri.view.snapshot import NOWHERE, Chart, Snapshot, Surroundings, VehicleShape, ViewError
 
-MAX_ROWS = 30_000
-"""Rows in memory: ten minutes at 50 Hz."""
+MAX_ROWS = 30_000  # rows in memory: ten minutes at 50 Hz
 CHART_POINTS = 512
 _ROW_S = 0.02
 _TRAIL_S = 8.0

@@ -11,8 +11,7 @@ from colibri.common.types import Array
 from colibri.flights.provenance import plan_of
 from colibri.flights.replay import answers_of
 
-EVERY = 5
-"""Control samples per horizon: 25 a second at 125 Hz."""
+EVERY = 5  # control samples per horizon: 25 a second at 125 Hz
 
 
 def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
