@@ -19,8 +19,7 @@ from colibri.mavlink.services.identity import IdentityName
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
-TRACK = "spiral"
-"""The default track."""
+TRACK = "spiral"  # the default track
 
 
 class Trajectory(msgspec.Struct, frozen=True):

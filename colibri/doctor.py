@@ -46,8 +46,7 @@ class Finding(NamedTuple):
 
 
 PACKAGE = "colibri-sitl"
-FOR_DEVELOPERS = ("bench", "clients", "dev")
-"""Extras that flights do not require."""
+FOR_DEVELOPERS = ("bench", "clients", "dev")  # extras that flights do not require
 _LOCK = "requirements.lock"
 _PINNED = re.compile(r"^[\w.-]+==[^\\\n]+", re.MULTILINE)
 _SHOWN = 3
@@ -264,8 +263,7 @@ def _station(codec: Codec, datagram: bytes) -> int | None:
 
 Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]
 
-CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)
-"""In order."""
+CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)  # in order
 _COLORS = {Severity.FINE: "green", Severity.NOTE: "yellow", Severity.FAILED: "bold red"}
 
 

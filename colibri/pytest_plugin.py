@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from colibri.sitl.vehicle import Sitl
 
 LINKS = ("memory", "udp")
-_MAX_NAME = 120
-"""Characters of a folder's name; a longer one is shortened, with a hash."""
+_MAX_NAME = 120  # characters of a folder's name; a longer one is shortened, with a hash
 _PLAIN = re.compile(r"[\w./]+(::\w+)*(\[[\w.-]+\])?", re.ASCII)
 """Names of tests that differ as folders, too; others get a hash."""
 _FLIGHTS = pytest.StashKey["Flights"]()
@@ -35,8 +34,7 @@ _SUMMARY = pytest.StashKey[flight_marks.Summary]()
 _SAID = pytest.StashKey[str]()
 _SAYS_COMPILING = pytest.StashKey[bool]()
 _UNWRITTEN = pytest.StashKey[str]()
-_REGISTERED = pytest.StashKey[list[str]]()
-"""Names of registered marks, once for each that registers it."""
+_REGISTERED = pytest.StashKey[list[str]]()  # names of registered marks, once for each that registers it
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -229,10 +229,8 @@ class ChaosFlight:
         return lands or actuation.descent is not None
 
 
-SPAN_S = 4.8
-"""Over which the instants of a situation are spread."""
-TIMES = (1.0, inf)
-"""Exceptions from an instant on: one, or all."""
+SPAN_S = 4.8  # over which the instants of a situation are spread
+TIMES = (1.0, inf)  # exceptions from an instant on: one, or all
 
 
 def main() -> int:

@@ -291,8 +291,7 @@ def in_the_air(flight: BareFlight) -> None:
 
 
 FRAMES_AFTER = 60
-MOST_BYTES = 4096
-"""What a link receives at once."""
+MOST_BYTES = 4096  # what a link receives at once
 FILES = 999
 
 

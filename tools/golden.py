@@ -20,10 +20,8 @@ import numpy as np
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.verification.verify import FOUND
 
-MIN_MINOR, MAX_MINOR = 11, 19
-"""Minor versions of Python 3 to look for."""
-_MADE_FROM = ("requirements.lock", "pyproject.toml")
-"""An environment older than these is stale."""
+MIN_MINOR, MAX_MINOR = 11, 19  # minor versions of Python 3 to look for
+_MADE_FROM = ("requirements.lock", "pyproject.toml")  # an environment older than these is stale
 _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 

@@ -34,10 +34,8 @@ from tools.harness.frame_times import FrameTimes
 VEHICLES = ("hummingbird", "hummingbird-rangefinder", "iris", "jmavsim")
 MODES = (Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.MISSION, Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
 _DRAWN = ("BAT_", "CBRK_", "COM_", "GF_", "MIS_", "MPC_", "NAV_", "RTL_", "TRK_")
-_KEPT = ("COM_DISARM_LAND",)
-"""Without it no flight ends by itself."""
-_BY_STATE = (faults.MOTOR, faults.BATTERY)
-"""Faults that act on flights without sensors."""
+_KEPT = ("COM_DISARM_LAND",)  # without it no flight ends by itself
+_BY_STATE = (faults.MOTOR, faults.BATTERY)  # faults that act on flights without sensors
 
 
 class RandomEvent(NamedTuple):
@@ -136,12 +134,10 @@ def _value(chance: random.Random, parameter: Parameter) -> Value:
 
 
 _SAID = (", terminate", ", at an unknown speed")
-MAX_IMPACT_M_S = 4.0
-"""The vehicle reports 3 m/s, by its estimate."""
+MAX_IMPACT_M_S = 4.0  # the vehicle reports 3 m/s, by its estimate
 MAX_TILT_DEG = 75.0
 AIRBORNE_M, NEAR_GROUND_M, TOUCHING_M = 1.0, 0.15, 0.03
-GRAZE_S, GRAZE_M_S = 0.5, 2.0
-"""A contact from which the vehicle flies on in this time, changed by less, is no impact."""
+GRAZE_S, GRAZE_M_S = 0.5, 2.0  # a contact from which the vehicle flies on in this time, changed by less, is no impact
 AFTER_S = 5.0
 LAND_WITHIN_S = 150.0
 

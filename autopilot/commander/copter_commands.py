@@ -19,8 +19,7 @@ from colibri.mavlink.services.statustext import CRITICAL, INFO
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
-DO_SEND_BANNER = 42428
-"""Of the dialect ardupilotmega."""
+DO_SEND_BANNER = 42428  # of the dialect ardupilotmega
 _BY_THRUST, _YAW_STAYS, _WITHOUT_THROTTLE = 8, 0, 2
 _MAX_SPIN = 0.3
 _POSITIVE = ("PSC_POSXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I")

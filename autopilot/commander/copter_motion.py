@@ -23,14 +23,11 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import MAX_HEIGHT_M
 from colibri.mavlink.wire.refusal import Refusal
 
-GUIDED, GUIDED_NOGPS, LOITER, ALT_HOLD, POSHOLD, CIRCLE, AUTO = 4, 20, 5, 2, 16, 7, 3
-"""Numbers of modes."""
+GUIDED, GUIDED_NOGPS, LOITER, ALT_HOLD, POSHOLD, CIRCLE, AUTO = 4, 20, 5, 2, 16, 7, 3  # numbers of modes
 _ABOVE_HOME = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CHANGES_MODE = 1.0
-_ARRIVES_WITHIN_M = 0.3
-"""Distance at which a take-off ends, added where sticks take over."""
-_LIFTING_US = 500_000
-"""Time in which a take-off by stick may become one to a height."""
+_ARRIVES_WITHIN_M = 0.3  # distance at which a take-off ends, added where sticks take over
+_LIFTING_US = 500_000  # time in which a take-off by stick may become one to a height
 
 
 class CopterMotion(MotionCommands):

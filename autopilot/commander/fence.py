@@ -15,11 +15,9 @@ from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
-CHECKED_AT_ONCE = 30_000
-"""Pairs of a place and an edge that fit into the processor's cache."""
+CHECKED_AT_ONCE = 30_000  # pairs of a place and an edge that fit into the processor's cache
 _LOOK_EVERY_US = 100_000
-_ITEM_US, _PAIR_US = 4.0, 0.02
-"""Work to build an item, and to compare a place with an edge."""
+_ITEM_US, _PAIR_US = 4.0, 0.02  # work to build an item, and to compare a place with an edge
 
 
 class Fence:

@@ -7,8 +7,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _DEEP_M = 10.0
-_UNCERTAIN_M = 0.5
-"""Allowed difference between estimated heights and heights above sea level."""
+_UNCERTAIN_M = 0.5  # allowed difference between estimated heights and heights above sea level
 
 
 class Home:

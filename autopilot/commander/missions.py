@@ -33,8 +33,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import MAX_HEIGHT_M, far, too_far
 from colibri.mavlink.wire.refusal import Refusal
 
-_PLACE_US = 2.0
-"""Work to find the place of an item."""
+_PLACE_US = 2.0  # work to find the place of an item
 _ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_NAV_VTOL_LAND, mav.MAV_CMD_DO_SET_HOME)
 _NONE = Refusal()
 _MOVED_M = 1.0

@@ -10,8 +10,7 @@ from colibri.autopilot.commander.rules.shown_modes import ModeBook, ShownMode
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.refusal import Refusal
 
-THROTTLE_UP = 0.1
-"""Of the stick's way; it starts a mission that waits."""
+THROTTLE_UP = 0.1  # of the stick's way; it starts a mission that waits
 
 
 class Needs(Protocol):

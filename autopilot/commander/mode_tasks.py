@@ -33,8 +33,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.node.budget import Budget
 from colibri.plant.vehicle.description import Vehicle
 
-_TRACK_US = 6000.0
-"""Work to tabulate a track."""
+_TRACK_US = 6000.0  # work to tabulate a track
 TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 """First task of a mode."""
 
@@ -48,8 +47,7 @@ class TaskRecord(NamedTuple):
     legs: tuple[int, ...] = ()
 
 
-_ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask, GuidedTask)
-"""Tasks restarted by an order."""
+_ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask, GuidedTask)  # tasks restarted by an order
 _AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
     Mode.HOLD: (GoTo, TakeOff),  # a take-off that has arrived settles in hold
     Mode.TAKEOFF: (TakeOff,),

@@ -19,14 +19,12 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import ABOVE_TERRAIN, MAX_DISTANCE_M, MAX_HEIGHT_M, far, height_m, read_place, too_far
 from colibri.mavlink.wire.refusal import Refusal
 
-MIN_CLIMB_M = 0.2
-"""A lower climb might not lift the feet."""
+MIN_CLIMB_M = 0.2  # a lower climb might not lift the feet
 MIN_RADIUS_M = 1.0
 MAX_YAW_RAD = 4.0 * pi
 MAX_TURN_DEG = 360.0
 _YAW_BEHAVIOURS = range(mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED + 1)
-_POINTS = 72
-"""Points of a circle checked against the fence."""
+_POINTS = 72  # points of a circle checked against the fence
 _NO_FRAME = (None, mav.MAV_FRAME_MISSION)
 _ELSEWHERE_M = 10.0
 _NOBODY = Peer(0, 0, 0)

@@ -15,8 +15,7 @@ _CELL_V = 4.2
 _SECONDS_PER_HOUR = 3600.0
 _MIN_CURRENT_A = 0.01
 _VOLTAGE = "SIM_BATT_VOLTAGE"
-_SAG = 0.03
-"""Tolerance, as a part of the full voltage: the model's rotors do not lag."""
+_SAG = 0.03  # tolerance, as a part of the full voltage: the model's rotors do not lag
 
 
 class BatteryMonitor:

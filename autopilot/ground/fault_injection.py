@@ -8,8 +8,7 @@ from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, Recei
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
 from colibri.mavlink.wire.refusal import Refusal
 
-ANSWERED_WITHIN_US = 1_000_000
-"""The result is normally in the frame after next."""
+ANSWERED_WITHIN_US = 1_000_000  # the result is normally in the frame after next
 
 
 class Failures:

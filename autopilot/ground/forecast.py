@@ -13,8 +13,7 @@ from colibri.common.types import Array
 from colibri.mavlink.telemetry.snapshot import Forecast
 from colibri.plant.vehicle.description import Vehicle
 
-POINTS = 5
-"""Size of TRAJECTORY_REPRESENTATION_WAYPOINTS."""
+POINTS = 5  # size of TRAJECTORY_REPRESENTATION_WAYPOINTS
 
 
 class Forecaster:

@@ -55,8 +55,7 @@ from colibri.mavlink.wire.signing import Signing
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-MAX_SAID = 20
-"""Status texts kept for the terminal."""
+MAX_SAID = 20  # status texts kept for the terminal
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 

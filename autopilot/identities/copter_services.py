@@ -21,8 +21,7 @@ from colibri.mavlink.wire.dialect import Message, mav
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
 _USING_GPS = ("AHRS: EKF3 active", "EKF3 IMU0 origin set", "EKF3 IMU0 is using GPS")
 _PREARM_EVERY_US = 30_000_000
-_SWITCHES_US = (1230, 1360, 1490, 1620, 1749)
-"""Upper ends of the first five positions of the mode switch."""
+_SWITCHES_US = (1230, 1360, 1490, 1620, 1749)  # upper ends of the first five positions of the mode switch
 _LOW_US, _HIGH_US, _CHANNEL_US = 1200, 1800, (800, 2200)
 _RAISED_US = 1600
 _THROTTLE, _YAW, _DOWN_US, _RIGHT_US, _LEFT_US, _HELD_US = 2, 3, 1050, 1900, 1100, 2_000_000

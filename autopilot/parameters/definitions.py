@@ -19,13 +19,10 @@ from colibri.plant.vehicle.description import MAX_ROTORS, Vehicle
 __all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
 
 _FOLDER = Path(__file__).parent
-DESCRIBED = {"lpv-mpc": read_numbers(_FOLDER / "lpv_mpc.csv")}
-"""Numbers by control law."""
-STRUCTURE = frozenset({"control_interval_s", "qp"})
-"""Keys of any control law fixed in flight."""
+DESCRIBED = {"lpv-mpc": read_numbers(_FOLDER / "lpv_mpc.csv")}  # numbers by control law
+STRUCTURE = frozenset({"control_interval_s", "qp"})  # keys of any control law fixed in flight
 _PREFIX_LENGTH = 3
-_SPEED = "{speed}"
-"""Placeholder for the unit of rotor speeds."""
+_SPEED = "{speed}"  # placeholder for the unit of rotor speeds
 
 
 class ImpossibleError(AutopilotError):

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 Ts = TypeVarTuple("Ts")
 _SILENCE_REPORTED_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
-_UNKNOWN_REPORTED_AFTER_US = 3_000_000
-"""Simulated time; alignment at rest takes 1 s."""
+_UNKNOWN_REPORTED_AFTER_US = 3_000_000  # simulated time; alignment at rest takes 1 s
 _UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
 
 

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
-_STANDING_SAMPLES = 50
-"""Control samples between saves while disarmed."""
+_STANDING_SAMPLES = 50  # control samples between saves while disarmed
 
 
 class GroundService:

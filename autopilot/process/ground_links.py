@@ -15,13 +15,10 @@ from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.node.router import Source
 from colibri.mavlink.streaming.rates import GCS, SDK
 
-SDK_PORTS = range(14540, 14550)
-"""Ports where SDKs wait for PX4; they request no streams, and expect all."""
-SHARE = 0.25
-"""Part of all time for receiving: the control law leaves more than half of a frame idle."""
+SDK_PORTS = range(14540, 14550)  # ports where SDKs wait for PX4; they request no streams, and expect all
+SHARE = 0.25  # part of all time for receiving: the control law leaves more than half of a frame idle
 MAX_SAVED_S = 0.005
-_GONE_AFTER_S = 3.5
-"""Wall-clock time; ground stations send a HEARTBEAT every second."""
+_GONE_AFTER_S = 3.5  # wall-clock time; ground stations send a HEARTBEAT every second
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:

@@ -31,10 +31,8 @@ from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
 from colibri.mavlink.ulog.samples import SampleBlocks, SensingBlocks, VehicleStatus, sensing_numbers, status_message
 
-MAX_RECEIVED_BYTES = 64 << 20
-"""Limit of logged datagrams: a flood must not fill the disk."""
-MAX_SAID_BYTES = 16 << 20
-"""Limit of status texts below the severity of errors."""
+MAX_RECEIVED_BYTES = 64 << 20  # limit of logged datagrams: a flood must not fill the disk
+MAX_SAID_BYTES = 16 << 20  # limit of status texts below the severity of errors
 _FULL = f"stations have sent more than {MAX_RECEIVED_BYTES >> 20} MiB: no more is recorded, a replay ends here"
 _FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _NO_REFERENCES = (nan,) * 11

@@ -15,12 +15,10 @@ from colibri.mavlink.streaming.rates import SILENT
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, mav
 from colibri.mavlink.wire.signing import Signing
 
-LINK = 1000
-"""Number of the link of these events: beyond those of ground stations."""
+LINK = 1000  # number of the link of these events: beyond those of ground stations
 _SETPOINTS_EVERY_US = 50_000
 _NEVER_US = 1 << 62
-_BEGINS_WITHIN_US = 5_000_000
-"""A flight's first estimate; sensors are aligned for a second."""
+_BEGINS_WITHIN_US = 5_000_000  # a flight's first estimate; sensors are aligned for a second
 
 
 class StationEvents:

@@ -7,8 +7,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.framing import frame_length
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 
-MAX_BYTES = 256 << 20
-"""A flood of a station must not fill the disk."""
+MAX_BYTES = 256 << 20  # a flood of a station must not fill the disk
 _KEY = mav.MAVLINK_MSG_ID_SETUP_SIGNING.to_bytes(3, "little")
 _IDENTIFIER = slice(7, 10)
 

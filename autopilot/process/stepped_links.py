@@ -11,8 +11,7 @@ from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packet
 from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.node.hub import Outgoing
 
-HOST = "127.0.0.1"
-"""The ports of a conductor's ground stations are their numbers."""
+HOST = "127.0.0.1"  # the ports of a conductor's ground stations are their numbers
 _MAX_WAIT_S = 0.1
 
 

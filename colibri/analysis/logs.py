@@ -15,8 +15,7 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 _AT_ONCE = 4096
 _MOST = 1e30  # powers of such values are finite
-_FINITE = {TRUTH.name: list(range(18)), DECISION.name: [*range(6), *range(10, 14)]}
-"""Columns that are always finite."""
+_FINITE = {TRUTH.name: list(range(18)), DECISION.name: [*range(6), *range(10, 14)]}  # columns that are always finite
 _NUMBERS = msgspec.json.Encoder()
 
 

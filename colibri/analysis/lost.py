@@ -117,8 +117,7 @@ def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:
 LOST_M = 5.0  # a settled vehicle further from its reference is lost
 _TOUCHED_S = 1.0  # longest contact with the ground below the reference
 _LAST_PART = 2.0 / 3.0
-LIMIT_CYCLE_RAD_S = 1.5
-"""A swing above it is a limit cycle; rotors slower than assumed cause 3 to 8 rad/s."""
+LIMIT_CYCLE_RAD_S = 1.5  # a swing above it is a limit cycle; rotors slower than assumed cause 3 to 8 rad/s
 _TURNING_S = 1.0  # a recovery may be upside down for so long
 _INSTANT_S = 1e-6
 

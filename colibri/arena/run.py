@@ -36,14 +36,12 @@ from colibri.common.process.lifecycle import one_line
 from colibri.conformance.subject import profile_for
 from colibri.studies.comparison import contenders_of
 
-CAP_M = LOST_M
-"""Errors of a lost flight."""
+CAP_M = LOST_M  # errors of a lost flight
 _METRICS = ("mean_error_m", "rmse_m", "max_error_m", "control_step_us.p50", "max_tilt_deg", "track_duration_s")
 METRICS = tuple(map(Metric, _METRICS))
 _MM = 1e3
 _MAX_COLUMNS = 3
-_LEAST_MM = 0.1
-"""Smallest error of the figure."""
+_LEAST_MM = 0.1  # smallest error of the figure
 _PUBLISHED = ("#777777", "#BBBBBB")
 
 

@@ -45,15 +45,13 @@ from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.parameter_files import px4_parameters
 
-CHANNELS = (0, 1, 2, 4, 8)
-"""Alternately a ground station's and an SDK's."""
+CHANNELS = (0, 1, 2, 4, 8)  # alternately a ground station's and an SDK's
 KINDS = (GCS, SDK)
 STATIONS = 2
 ALONE, WATCHED = "alone", f"{STATIONS} stations"
 _WATCHING = {ALONE: 0, WATCHED: STATIONS}
 
-_MIN_FRAMES = 4
-"""Frames until all code is loaded."""
+_MIN_FRAMES = 4  # frames until all code is loaded
 
 
 def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:
@@ -111,10 +109,8 @@ def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
 FRAME_US, CONTROL_US = 4_000, 8_000
 LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
-_MIN_S = 4.0
-"""It begins with a second of standing."""
-_SETTLED = 500
-"""Frames left out: the estimator aligns."""
+_MIN_S = 4.0  # it begins with a second of standing
+_SETTLED = 500  # frames left out: the estimator aligns
 FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 
@@ -166,11 +162,9 @@ PX4, ARDUPILOT = "PX4", "ArduPilot"
 VEHICLES = {PX4: "iris", ARDUPILOT: "hummingbird"}
 FRAMES_HZ = {PX4: 250, ARDUPILOT: 1200}
 AIR: dict[str, dict[str, str]] = {"calm": {}, "moderate turbulence": {"turbulence": "moderate", "wind": "5@270"}}
-_HIGH_UP = {"z": 100.0}
-"""A vehicle without control needs room to fall."""
+_HIGH_UP = {"z": 100.0}  # a vehicle without control needs room to fall
 _LOADED_AFTER = 100
-_TRUTH_EVERY_US = 5e3
-"""Interval that PX4 requests."""
+_TRUTH_EVERY_US = 5e3  # interval that PX4 requests
 _REQUEST, _MAGIC = Struct("<HHI16H"), 18458
 _ELSEWHERE: Address = ("127.0.0.1", 1)
 

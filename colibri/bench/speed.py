@@ -44,12 +44,10 @@ Report: TypeAlias = Callable[[str], None]
 T = TypeVar("T")
 Samples: TypeAlias = dict[str, list[float]]
 
-CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
-"""Control interval at each frame rate, Hz."""
+CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}  # control interval at each frame rate, Hz
 LINKS = ("memory", "udp")
 
-_PEER_MAX_S = 2.0
-"""A peer may be slower than real time."""
+_PEER_MAX_S = 2.0  # a peer may be slower than real time
 _WARM_UP_S = 0.5
 
 

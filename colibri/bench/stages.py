@@ -33,8 +33,7 @@ BLOCKS: Mapping[int, tuple[int, ...]] = {12: (1, 2, 3, 6), 28: (1, 2, 3, 5, 7, 1
 """Steps of each correction, by horizon: short, as in `flight`, and as in `path`."""
 PROFILE_HORIZON = 28
 
-_QPS = 100
-"""QPs of a flight for each solver."""
+_QPS = 100  # QPs of a flight for each solver
 _QPS_TO_WARM_UP = 5
 _MIN_SAMPLES = 50
 _REPLY_WITHIN_S = 1.0

@@ -18,8 +18,7 @@ from colibri.common.types import Array
 _MAX_ROUNDS = 40
 _ADDED = 5
 _ENOUGH = 5e-8  # tolerance of an inequality's least eigenvalue
-_USABLE = ("Solved", "AlmostSolved", "InsufficientProgress")
-"""Statuses that may come with a solution; a check decides."""
+_USABLE = ("Solved", "AlmostSolved", "InsufficientProgress")  # statuses that may come with a solution; a check decides
 
 
 class Inequality(NamedTuple):
@@ -70,8 +69,7 @@ def _vectors(matrices: Array) -> Array:
 _LEAST_MARGIN = 1e-6  # smallest decrease of a Lyapunov function about the identity
 _BISECTIONS = 6
 _SET_RATIOS = (0.98, 0.95, 0.99)
-_ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)
-"""Ratios of V between samples, in order of trial; slower decay gives larger sets."""
+_ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)  # ratios of V between samples, in order of trial; slower decay gives larger sets
 _STAGE_BESIDE = 1e-6  # covers states without stage cost
 _ROUNDING = 1e-6  # covers the solver's errors of up to about 1e-7
 _SPARE = 1e-4  # relative margin of all constraints, for the solver's errors

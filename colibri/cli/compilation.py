@@ -20,8 +20,7 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "tests": {"sitl": True},
 }
 _COUNT_EVERY_S = 5.0
-_SHARED_BY = 2
-"""Processes that fly each: what one compiles, the other need not; further ones would mostly wait."""
+_SHARED_BY = 2  # processes that fly each: what one compiles, the other need not; further ones would mostly wait
 
 
 def compile(args: Namespace) -> int:

@@ -26,8 +26,7 @@ MASS = Protocol("mass estimated in flight", ("mass_kg", "with_mass"))
 PATH = Protocol("speed along the references", ("min_path_speed", "step_on_path", "path_speed", "lag_us", "with_lag"))
 PLAN = Protocol("plan of attitudes", ("plan_columns",))
 COMPILED = Protocol("compiled parts", ("warm_up",))
-OPTIONAL = (ATTITUDE, CHARGE, MASS, PATH, PLAN, COMPILED)
-"""In the order of docs/controllers.md."""
+OPTIONAL = (ATTITUDE, CHARGE, MASS, PATH, PLAN, COMPILED)  # in the order of docs/controllers.md
 
 
 def interface_checks(subject: Subject) -> Iterator[Row]:
@@ -96,8 +95,7 @@ def _settings(subject: Subject) -> Row:
     return Row("", tried, Result.FIGURE, "no: read_settings reads it strictly")
 
 
-_S, _SAMPLES = 0.4, 6
-"""Duration of each flight, and least number of samples."""
+_S, _SAMPLES = 0.4, 6  # duration of each flight, and least number of samples
 _STARTS = 5
 Draw: TypeAlias = Callable[[np.random.Generator], dict[str, float]]
 

@@ -83,8 +83,7 @@ class Restarted(NamedTuple):
     is_plain: bool  # the law's memory was kept
 
 
-_BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5
-"""Durations around a restart, and of a held attitude."""
+_BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5  # durations around a restart, and of a held attitude
 HOW = ("seamless", "anew", "blind")
 
 
@@ -175,8 +174,7 @@ def _build(subject: Subject, key: str, value: float) -> Controller[Any]:
 _TRACK = "circle:speed=1"
 _ON_IT = {"x": 2.0, "psi": 90.0, "vy": 1.0}
 _MAX_TILT_DEG = 45.0
-_STEPS = 3
-"""Steps with each changed number."""
+_STEPS = 3  # steps with each changed number
 _TRIED = {
     "seamless": "from its checkpoint, the same flight bit for bit",
     "anew": "restarted in flight, charge and mass kept",

@@ -22,8 +22,7 @@ from colibri.conformance.subject import Result, Row, Subject, judged, not_applic
 _TRACK = "hover:height=3"
 _S, _SAMPLES = 0.3, 4
 _CLOSE = 1e-9
-_MAX_TILT_DEG = 10.0
-"""Largest error of a held attitude."""
+_MAX_TILT_DEG = 10.0  # largest error of a held attitude
 
 _DEMAND = "AttitudeDemand(np.tile({0!r}, (n, 1)), np.zeros((n, 3)), np.full(n, {1!r}))"
 
@@ -207,8 +206,7 @@ _EXAMINED: dict[Protocol, Examine] = {
 
 
 _LAP, _OTHER = "lemniscate:lap=10,height=5", "hover:height=3"
-_MEMORY_S, _MEMORY_SAMPLES = 0.6, 8
-"""Duration, and least number of samples."""
+_MEMORY_S, _MEMORY_SAMPLES = 0.6, 8  # duration, and least number of samples
 
 Taken: TypeAlias = Iterator[tuple[int, Array, Array]]
 """Number of a step, and its original and repeated rotor speeds."""

@@ -156,11 +156,9 @@ def jumped(step: FlownStep, seed: int) -> FlownStep:
     return step._replace(references=references, state=step.state._replace(airborne=not step.state.airborne))
 
 
-_HOVER_S, _MAX_DRIFT_M = 8.0, 0.5
-"""Permitted drift in calm air, from rest on the point."""
+_HOVER_S, _MAX_DRIFT_M = 8.0, 0.5  # permitted drift in calm air, from rest on the point
 _WIND, _WIND_S = "5@270", 12.0
-_TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5
-"""Duration and least number of timed steps, without the first few."""
+_TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5  # duration and least number of timed steps, without the first few
 
 
 class FlownDistance(NamedTuple):

@@ -20,8 +20,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 _DEFAULT_PROFILE = "flight"
 _MODULE = "colibri.conformance"
-_SHELLS = set('"$`\\!')
-"""Special characters between double quotes."""
+_SHELLS = set('"$`\\!')  # special characters between double quotes
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,8 +132,7 @@ def _link_texts(link: dict[str, Any], width: int) -> tuple[str, ...]:
 
 
 MAX_FLEET = 100
-_MAX_DEATHS, _LOOP_S = 3, 60.0
-"""A vehicle with more deaths of its processes in this time ends the fleet."""
+_MAX_DEATHS, _LOOP_S = 3, 60.0  # a vehicle with more deaths of its processes in this time ends the fleet
 
 
 @dataclass(slots=True, eq=False)

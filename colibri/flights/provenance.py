@@ -23,8 +23,7 @@ from colibri.flights.spec import FlightSpec
 from colibri.plant.environment.weather import RecordedWind
 from colibri.plant.vehicle.description import Vehicle
 
-_NOT_KEPT = ("out", "tlog", "gcs", "signing_key", "insecure", "speed")
-"""Options without effect on the flight."""
+_NOT_KEPT = ("out", "tlog", "gcs", "signing_key", "insecure", "speed")  # options without effect on the flight
 _NAMES = ("track", "profile", "controller", "solver", "delay", "vehicle", "plant_vehicle", "without")
 """Options that are recorded by the contents they name."""
 

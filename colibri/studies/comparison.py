@@ -214,8 +214,7 @@ SEED_HEADINGS = (
     *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
     "NEES",
 )
-_WITHOUT_ESTIMATE = 5
-"""Columns of a flight on the state."""
+_WITHOUT_ESTIMATE = 5  # columns of a flight on the state
 _SEED_ERRORS = (
     *("control_rmse_m", "rmse_after_20s_m", "estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw"),

@@ -39,8 +39,7 @@ SPIRAL, LEMNISCATE = "spiral", "lemniscate"
 
 _LEVEL_DEG = 10.0
 _THERE_M = 0.1
-_SIZE_M = 4.0
-"""Default size of the lemniscate."""
+_SIZE_M = 4.0  # default size of the lemniscate
 
 
 class Measure(NamedTuple):

@@ -26,8 +26,7 @@ from colibri.mavlink.ulog.flight_topics import TRUTH
 from colibri.mavlink.ulog.log import MemoryLog
 
 _AWAY_M = 200.0
-_GROUNDED_M = 0.1
-"""A vehicle on its back is lower than that."""
+_GROUNDED_M = 0.1  # a vehicle on its back is lower than that
 _SAMPLE_TIME_S = 1e-6
 
 
@@ -127,8 +126,7 @@ LIMITS_SHOWN_S = 6.0
 _LEGEND_ROW_IN = 0.24
 _SHADE = "#E8E8E8"
 _CONTENDERS = {"thesis": "#D55E00", "SE(3)": "#0072B2", "LPV-MPC": "#000000", "LPV-MPC on the path": "#009E73"}
-_MOST_M = 50.0
-"""Larger errors are drawn at this one."""
+_MOST_M = 50.0  # larger errors are drawn at this one
 _ALSO_WITHOUT = ("SE(3)", "LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 

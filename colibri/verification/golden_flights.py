@@ -67,8 +67,7 @@ class SitlCase(NamedTuple):
         return sitl.sha256
 
 
-SHOWN = 16
-"""Characters of a hash in tables."""
+SHOWN = 16  # characters of a hash in tables
 
 
 GUSTS: dict[str, Any] = {"wind": "8@270", "turbulence": "moderate", "seed": 7}

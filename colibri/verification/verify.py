@@ -22,8 +22,7 @@ from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.verification.golden_flights import FLIGHTS, SHOWN, SitlCase, TrackCase
 
-FOUND = "golden.json"
-"""File of the results in the folder of the logs."""
+FOUND = "golden.json"  # file of the results in the folder of the logs
 _NO_HASH = "-"
 
 _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]

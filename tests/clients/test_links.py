@@ -11,8 +11,7 @@ from tests.clients.support.client import Client
 from tools.harness.processes import vehicle
 
 ROOT = Path(__file__).parents[2]
-WITHIN_S = 120.0
-"""A wall-clock bound for what hangs."""
+WITHIN_S = 120.0  # a wall-clock bound for what hangs
 
 
 def run(script: str, url: str, folder: Path) -> None:

@@ -18,13 +18,11 @@ from tools.harness.observer import Observer
 from tools.harness.processes import SitlProcess, vehicle
 
 ROOT = Path(__file__).parents[2]
-SPEED = 3.0
-"""Times real time: MAVSDK's own time-outs run on the wall clock, and still find the vehicle prompt."""
+SPEED = 3.0  # times real time: MAVSDK's own time-outs run on the wall clock, and still find the vehicle prompt
 WITHIN_S = 120.0
 PATIENT_S = 5.0
 """A companion may be silent for so long, simulated: it lives on a clock that is slower, beside other tests."""
-ACCEPTANCE_M = 0.3
-"""So close to the height, a take-off has ended."""
+ACCEPTANCE_M = 0.3  # so close to the height, a take-off has ended
 HOME: Vector = (0.0, 0.0, 0.0)
 
 

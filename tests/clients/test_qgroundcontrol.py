@@ -18,8 +18,7 @@ from tools.harness.processes import SitlProcess, vehicle
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 CUSTOM = mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 GROUND_M = DEFAULT_HOME.altitude_m
-SPEED = 4.0
-"""Times real time, of these flights."""
+SPEED = 4.0  # times real time, of these flights
 
 
 @contextmanager

@@ -16,11 +16,9 @@ from tools.harness.processes import vehicle
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 LINES = 40
 SLOW = {"learn_hover", "mavsdk_takeoff", "test_return"}
-LEARNS = "learn_hover"
-"""Run for two generations only."""
+LEARNS = "learn_hover"  # run for two generations only
 STARTS_PROCESSES = "campaign_and_plot"
-SPEED = 3.0
-"""Of vehicles for clients, times real time."""
+SPEED = 3.0  # of vehicles for clients, times real time
 
 
 def promised(path: Path) -> str:

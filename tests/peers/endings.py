@@ -22,8 +22,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from tests.peers.half_speed import PATIENT, Bench, own_physics
 
-RETURN = (1.0, 4.0, 5.0)
-"""The mode that the pilot chooses; PX4 leaves those that need sticks at once where it has none."""
+RETURN = (1.0, 4.0, 5.0)  # the mode that the pilot chooses; PX4 leaves those that need sticks at once where it has none
 GIVE_UP_S = 90.0
 FLIES_S = 3.0
 

@@ -24,8 +24,7 @@ from colibri.mavlink.wire.dialect import mav
 from tests.peers.on_the_plant import plant, px4_command, px4_settings
 
 SPEED = 0.5
-WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}
-"""It holds PX4 up where the disk is slow."""
+WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}  # it holds PX4 up where the disk is slow
 OWN_PHYSICS = WITHOUT_LOGGER | {
     "PX4_SYS_AUTOSTART": "10040",
     "PX4_SIM_MODEL": "sihsim_quadx",

@@ -22,12 +22,10 @@ from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, mav
 
 VEHICLES = {"px4": "iris", "ardupilot": "hummingbird"}
-SPEED = 5
-"""Times real time: what a computer that is busy with other tests still keeps to."""
+SPEED = 5  # times real time: what a computer that is busy with other tests still keeps to
 HOVER_S = 15.0
 NEARLY_THERE_M = 1.7
-TAKE_OFF_M = 2.0
-"""Of ArduPilot; PX4 has MIS_TAKEOFF_ALT, 2.5 m."""
+TAKE_OFF_M = 2.0  # of ArduPilot; PX4 has MIS_TAKEOFF_ALT, 2.5 m
 _GIVE_UP_AFTER_S = 120.0
 _ASK_EVERY_US = 200_000
 _VEHICLE = (1, AUTOPILOT_COMPONENT)

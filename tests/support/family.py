@@ -23,8 +23,7 @@ APART_M = 1e-3
 LAPS_S = (4.0, 3.0, 2.0, 1.0)
 STARTS = 50
 DURATION_S = 40.0
-CAUGHT_UP_S = 4.0
-"""The start, 1 m below and beside the track, no longer counts."""
+CAUGHT_UP_S = 4.0  # the start, 1 m below and beside the track, no longer counts
 
 
 class Flown(NamedTuple):

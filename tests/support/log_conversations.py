@@ -6,10 +6,8 @@ from colibri.mavlink.client.conversation import OK, Conversation, Encoded, Repea
 from colibri.mavlink.wire.dialect import Message
 
 _BLOCK_BYTES = 90
-_CHUNK_BYTES = 128 * _BLOCK_BYTES
-"""As much as a socket's buffer surely holds, and as MAVSDK requests at once."""
-_SILENCE = Repeat(every_us=100_000, tries=100)
-"""What is missing of an answer is requested again after a short silence."""
+_CHUNK_BYTES = 128 * _BLOCK_BYTES  # as much as a socket's buffer surely holds, and as MAVSDK requests at once
+_SILENCE = Repeat(every_us=100_000, tries=100)  # what is missing of an answer is requested again after a short silence
 _LAST_ID = 0xFFFF
 
 

@@ -12,8 +12,7 @@ from colibri.mavlink.wire.dialect import Codec, Message, mav
 from tests.support.strangers import Airframe, Known, Point, hovering
 from tools.harness.processes import GIVE_UP_AFTER_S
 
-STARTING_FRAMES = 5
-"""How many frames PX4 needs before it moves a motor."""
+STARTING_FRAMES = 5  # how many frames PX4 needs before it moves a motor
 TURN_M = 0.05 / 4.0
 JMAVSIM = Airframe(
     0.8,

@@ -19,8 +19,7 @@ Path: TypeAlias = Callable[[Array], Array]
 
 GRAVITY_M_S2 = 9.81
 INTERVAL_US = 4000
-REST_S = 4.0
-"""Every path begins with rest."""
+REST_S = 4.0  # every path begins with rest
 _STENCIL_S = 2e-3
 
 

@@ -36,8 +36,7 @@ from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 
 TCP_PORT, RADIO_PORT, PORTS_EACH = 5760, 5501, 10
-FEEDBACK = "COLIBRI_FEEDBACK"
-"""Environment variable for what ArduCopter's command line has no option for."""
+FEEDBACK = "COLIBRI_FEEDBACK"  # environment variable for what ArduCopter's command line has no option for
 _RADIO_BYTES, _FIRST_FRAMES, _ENDLESS_AH = (16, 32), 100, 1e4
 _MODELS = ("+", "quad", "x", "X")
 

@@ -19,8 +19,7 @@ from tools.fuzz.vehicle import ground_campaign
 from tools.harness.ports import Relay
 from tools.harness.processes import Process, fly_thesis, running, start_autopilot, start_plant, states
 
-UNREADABLE = ("malformed", "unknown", "truncated")
-"""Counts of a codec that depend on the datagram alone."""
+UNREADABLE = ("malformed", "unknown", "truncated")  # counts of a codec that depend on the datagram alone
 
 
 class FuzzingRelay(Relay):

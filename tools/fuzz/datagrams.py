@@ -15,8 +15,7 @@ Ids = tuple[int, int]
 
 AUTOPILOT: Ids = (1, common.MAV_COMP_ID_AUTOPILOT1)
 PLANT: Ids = (1, common.MAV_COMP_ID_USER1)
-HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS = 0, 31, 32, 76, 77, 93
-"""The messages of the conversation."""
+HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS = 0, 31, 32, 76, 77, 93  # the messages of the conversation
 KNOWN: tuple[int, ...] = tuple(sorted(common.mavlink_map))
 MAX_MESSAGE_ID = 0xFFFFFF
 
@@ -44,8 +43,7 @@ def _crc(content: bytes, message_id: int) -> bytes:
     return struct.pack("<H", common.x25crc(bytearray(content) + bytes([extra])).crc)
 
 
-FRAME_US = 100_000
-"""Interval of the flight under fire."""
+FRAME_US = 100_000  # interval of the flight under fire
 
 _CONVERSATION = (HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS)
 _SET_MESSAGE_INTERVAL = 511

@@ -12,8 +12,7 @@ from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.missing_messages import LATER
 
 NOT_GIVEN = 2**31 - 1
-MAX_SPEED_M_S = 25.0
-"""The most that parameter MPC_XY_VEL_MAX can be."""
+MAX_SPEED_M_S = 25.0  # the most that parameter MPC_XY_VEL_MAX can be
 _WITHOUT_PLACE = mav.MAV_FRAME_MISSION
 
 

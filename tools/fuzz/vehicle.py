@@ -38,8 +38,7 @@ from colibri.sitl.vehicle import FORCE
 from tools.fuzz.messages import COMMANDS, SENSIBLE, Messages, Sent, asked
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
-STANDING = Start()
-"""On its feet: z counts from where the vehicle stands."""
+STANDING = Start()  # on its feet: z counts from where the vehicle stands
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 _AS_IT_IS = load_profile("flight")
 _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
@@ -118,8 +117,7 @@ class BareFlight(Stepped, Steered):
         return int(ack.result)
 
 
-HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
-"""Falling: a vehicle at rest has landed."""
+HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)  # falling: a vehicle at rest has landed
 _MAX_REFERENCE_M_S = 60.0
 _MAX_DISTANCE_M, _MAX_HOME_DISTANCE_M = 2_000.0, 101_000.0
 _ACK = mav.MAVLINK_MSG_ID_COMMAND_ACK
@@ -276,8 +274,7 @@ def _integers(place: tuple[float, float, float]) -> tuple[int, int, int]:
 
 
 MAX_GROWTH_MIB = 4.0
-FEWEST_FOR_MEMORY = 200_000
-"""With fewer, memory shows the allocator's habits."""
+FEWEST_FOR_MEMORY = 200_000  # with fewer, memory shows the allocator's habits
 _A_FRAME = 40
 _FRAMES_A_SITUATION = 15
 

@@ -6,8 +6,7 @@ from colibri.autopilot.core.step import Received
 from colibri.mavlink.client import client
 from colibri.mavlink.client.inbox import Inbox
 
-SYSTEM, COMPONENT = 1, 1
-"""Of the vehicle."""
+SYSTEM, COMPONENT = 1, 1  # of the vehicle
 GCS_PORT, SDK_PORT = 14550, 14540
 
 

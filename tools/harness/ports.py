@@ -73,8 +73,7 @@ class OnPort(ServedSockets):
             self.send(answer)
 
 
-LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
-"""Parts of the datagrams on a `BadLink`."""
+LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1  # parts of the datagrams on a `BadLink`
 
 
 class Relay(ServedSockets):

@@ -136,8 +136,7 @@ def states(out: Path) -> Array:
 WAITING = "udpin:127.0.0.1:0"
 _WAITS = re.compile(r"waits for ground stations on 127\.0\.0\.1:(\d+) \((udpin|tcpin)\)")
 _GRACE_S = 10.0
-_COMPILES_HOURS = 0.05
-"""The first start after a change compiles."""
+_COMPILES_HOURS = 0.05  # the first start after a change compiles
 
 
 class SitlProcess:

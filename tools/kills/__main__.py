@@ -198,8 +198,7 @@ def fly_plants(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple
     return done, "".join(process.errors() for process in processes)
 
 
-MAX_TILT_DEG = 35.0 + 45.0
-"""45° more than a pilot may ask for."""
+MAX_TILT_DEG = 35.0 + 45.0  # 45° more than a pilot may ask for
 MAX_LOST_M = 2.0
 _PLANTS_A_FLIGHT = 10
 

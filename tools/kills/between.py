@@ -38,8 +38,7 @@ def mission(legs: int = LEGS) -> list[MissionItem]:
     return [*items, _item(mav.MAV_CMD_NAV_LAND, *_PLACES[legs - 1])]
 
 
-HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))
-"""Items of the mission with a hover."""
+HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))  # items of the mission with a hover
 
 
 class KillStation:
@@ -117,16 +116,13 @@ def _item(command: int, east: float, north: float, p1: float = 0.0) -> MissionIt
     return Item(command, (p1, 0.0, 0.0, nan), (east, north, up)).on_wire(DEFAULT_ORIGIN)
 
 
-GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
-"""Bounds for what hangs; the first autopilot may have to compile."""
+GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0  # bounds for what hangs; the first autopilot may have to compile
 _MAX_DATAGRAM_BYTES = 65536
 _LOOK_S = 0.02
-_HEAD = 10
-"""Bytes of a frame of MAVLink 2 before its payload."""
+_HEAD = 10  # bytes of a frame of MAVLink 2 before its payload
 _TIMES = {dialect.MSG_ATTITUDE_QUATERNION: (4, 1000), dialect.MSG_HIL_SENSOR: (8, 1)}
 """Bytes of the time in a frame of the plant, and its unit, µs."""
-_ANSWER = 93
-"""HIL_ACTUATOR_CONTROLS."""
+_ANSWER = 93  # HIL_ACTUATOR_CONTROLS
 
 
 class KillInstant(Enum):

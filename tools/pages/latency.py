@@ -21,12 +21,10 @@ from tools.pages.tables import with_tables
 
 LAWS = ("lpv-mpc", "geometric-se3")
 ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
-_SHOWN_MS = (0, 8, 16, 24, 40, 60, 100)
-"""In the tables; the figure has all of them."""
+_SHOWN_MS = (0, 8, 16, 24, 40, 60, 100)  # in the tables; the figure has all of them
 LOST_M = 5.0
 _WRONG_MS = 5.0
-_SETTLED = 3.0
-"""Factor on the error without delay, and an error, that are still good."""
+_SETTLED = 3.0  # factor on the error without delay, and an error, that are still good
 _WELL_M = 1e-3
 
 

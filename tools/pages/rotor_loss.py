@@ -31,10 +31,8 @@ from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_tables
 
 HEIGHT_M = 10.0
-UPRIGHT_DEG, NEAR_M, SOFT_M_S = 20.0, 5.0, 2.0
-"""Largest tilt once settled, distance and speed at touch-down."""
-SETTLED_S = 1.0
-"""After the loss; then the vehicle is upright for good."""
+UPRIGHT_DEG, NEAR_M, SOFT_M_S = 20.0, 5.0, 2.0  # largest tilt once settled, distance and speed at touch-down
+SETTLED_S = 1.0  # after the loss; then the vehicle is upright for good
 COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
 """s since the loss, m from its place (z above ground), m/s, degrees, rad/s, parts of the largest."""
 _T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)

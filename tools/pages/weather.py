@@ -19,8 +19,7 @@ _HEIGHT_M = 3.048
 _FRAME_US = 4000
 _SHOWN_S = 40.0
 _MEASURED_S = 1000.0
-_RESOLVED_HZ = 0.05
-"""Below, windows of 65 s blur what they measure."""
+_RESOLVED_HZ = 0.05  # below, windows of 65 s blur what they measure
 _COLORS = {"light": "#E69F00", "moderate": "#0072B2", "severe": "#D55E00"}
 
 

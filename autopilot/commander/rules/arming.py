@@ -9,13 +9,10 @@ from colibri.mavlink.wire.refusal import Refusal
 
 MAX_TILT_DEG = 45.0
 MAX_SPEED_M_S = 0.5
-MIN_CHARGE = 0.1
-"""Part of the battery's charge."""
-VOLTAGE_OF = (0.5, 1.2)
-"""Bounds of a healthy voltage, relative to the empty and the full voltage."""
+MIN_CHARGE = 0.1  # part of the battery's charge
+VOLTAGE_OF = (0.5, 1.2)  # bounds of a healthy voltage, relative to the empty and the full voltage
 MAX_THRUST_STICK = 0.6
-_SURELY_LEVEL = 0.1
-"""x² + y² of a quaternion at 37 degrees of tilt, below which the slow arc cosine is skipped."""
+_SURELY_LEVEL = 0.1  # x² + y² of a quaternion at 37 degrees of tilt, below which the slow arc cosine is skipped
 
 
 class ArmingInputs(NamedTuple):

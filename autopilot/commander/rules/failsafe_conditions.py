@@ -15,12 +15,9 @@ from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint
 from colibri.mavlink.telemetry.snapshot import BatteryState
 
-NEVER_US = -(10**12)
-"""Start of listening for clients without a restart."""
-PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
-"""Modes without a need for position."""
-_FROZEN_M, _FROZEN_RAD = 0.05, 0.05
-"""Motion by the rates beyond which an unchanged state is a fault."""
+NEVER_US = -(10**12)  # start of listening for clients without a restart
+PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)  # modes without a need for position
+_FROZEN_M, _FROZEN_RAD = 0.05, 0.05  # motion by the rates beyond which an unchanged state is a fault
 _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
 """Fallbacks after an unsolved QP; recovery is one if a QP was tried."""
 

@@ -18,8 +18,7 @@ _CHOICES = {row.parameter: row for row in TABLE}
 _LINES = read_numbers(Path(__file__).with_name("failsafe_parameters.csv"))
 NUMBERS = tuple(line for line in _LINES if line.name not in _CHOICES)
 """Limits and delays; the other lines are actions, whose numbers are in the table of failsafes."""
-ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
-"""Delays defined with the behaviour, because modes use them."""
+ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")  # delays defined with the behaviour, because modes use them
 _COPTER_ACTIONS = {Condition.BATTERY_LOW: "BATT_FS_LOW_ACT", Condition.BATTERY_CRITICAL: "BATT_FS_CRT_ACT"}
 _COPTER_BATTERY = (
     *(Action.WARN, Action.LAND, Action.RETURN, Action.RETURN),

@@ -8,8 +8,7 @@ from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE,
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
-CLEAR_AFTER_US = 1_000_000
-"""Time until a condition is over, so that a flickering link is lost once."""
+CLEAR_AFTER_US = 1_000_000  # time until a condition is over, so that a flickering link is lost once
 
 _ORDER = {row.condition: place for place, row in enumerate(TABLE)}
 _SEVERITIES: Mapping[Action, int] = {

@@ -173,8 +173,7 @@ def first_missing(mode: Mode, missing: Collection[Need]) -> Need | None:
 
 _NUMBERS = {row.mode: row.main << 16 | row.sub << 24 for row in MODES}
 _BY_NUMBER = {number: mode for mode, number in _NUMBERS.items()}
-_ALIASES = {(1, 0): Mode.STABILIZED}
-"""PX4's manual mode flies a multicopter like stabilized."""
+_ALIASES = {(1, 0): Mode.STABILIZED}  # PX4's manual mode flies a multicopter like stabilized
 
 
 def mode_of(main: int, sub: int) -> Mode | None:

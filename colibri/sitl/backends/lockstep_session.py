@@ -28,8 +28,7 @@ __tracebackhide__ = True  # a failed test shows its own lines, not these
 PlantSide: TypeAlias = MemoryPlant | UdpPlant
 AutopilotSide: TypeAlias = MemoryAutopilot | UdpAutopilot
 _GLANCE_S = 0.002
-_GIVE_UP_S = 200.0
-"""In time of the link clock. Flights are independent of it."""
+_GIVE_UP_S = 200.0  # in time of the link clock. Flights are independent of it.
 
 
 class LockstepSession:

@@ -18,8 +18,7 @@ from colibri.sitl.backends.link_faults import QuickClock, SessionError, answers,
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 
-SILENCE_S = 60.0
-"""Wall-clock time after which a silent process counts as dead. Flights are independent of it."""
+SILENCE_S = 60.0  # wall-clock time after which a silent process counts as dead. Flights are independent of it.
 _LOOK_EVERY_S = 0.1
 _HERE = "udpin:127.0.0.1:0"
 

@@ -14,8 +14,7 @@ from colibri.view.page.server import PageServer, Token, address, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
-_LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
-"""Half size of the view before a live path is known; margin around its plans."""
+_LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2  # half size of the view before a live path is known; margin around its plans
 
 
 class Page:

@@ -10,8 +10,7 @@ from colibri.view import geometry
 from colibri.view.geometry import Colour
 from colibri.view.snapshot import NO_POINTS, Mark, Snapshot, Surroundings, VehicleShape
 
-COLOURS: tuple[Colour, ...] = ((30, 110, 210), (230, 120, 20), (40, 150, 70), (150, 60, 170))
-"""By vehicle."""
+COLOURS: tuple[Colour, ...] = ((30, 110, 210), (230, 120, 20), (40, 150, 70), (150, 60, 170))  # by vehicle
 LAYERS = ("trail", "path", "reference", "horizon", "thrust", "estimate", "wind", "mission, fence")
 REFERENCE: Colour = (120, 120, 120)
 HORIZON: Colour = (220, 30, 160)

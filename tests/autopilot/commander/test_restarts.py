@@ -43,8 +43,7 @@ STEERED = ClientInputs(
     PositionSetpoint((20.0, 5.0, 8.0)),
     TargetState((15.0, 0.0, 0.0), (1.0, 0.5, 0.0), (0.0, 0.0, 0.0)),
 )
-NEAR = 0.02
-"""m, m/s, rad: a circle is joined again at the angle of the reference, which lags a little."""
+NEAR = 0.02  # m, m/s, rad: a circle is joined again at the angle of the reference, which lags a little
 DATA = TypeVar("DATA")
 
 

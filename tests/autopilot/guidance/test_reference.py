@@ -53,8 +53,7 @@ def led(reference: Reference, target: Target, limits: Limits, seconds: float) ->
     return np.array(motions), np.array(headings), reference
 
 
-SLACK = 1.003
-"""Of the acceleration, which follows a jerk that changes only once a sample."""
+SLACK = 1.003  # of the acceleration, which follows a jerk that changes only once a sample
 LATE_S = 2.0 * INTERVAL_S
 """How late an acceleration ends: it changes once a sample, so that a speed exceeds its limit by that much of it."""
 START = at(ORIGIN)

@@ -79,8 +79,7 @@ def test_what_cannot_be_together_is_refused(flight: Flight, name: str, value: fl
     assert made(flight.parameters) is None
 
 
-STAYS_IN_FLIGHT = {"LPV_TILT_MAX"}
-"""Without a tilt limit the law needs a longer preview, which stays in flight."""
+STAYS_IN_FLIGHT = {"LPV_TILT_MAX"}  # without a tilt limit the law needs a longer preview, which stays in flight
 
 
 @pytest.mark.parametrize("controller", DESCRIBED)

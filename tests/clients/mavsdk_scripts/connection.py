@@ -13,8 +13,7 @@ from mavsdk.plugins.telemetry import FlightMode, Telemetry
 
 _LOOK_EVERY_S = 0.01
 _FOUND_WITHIN_S = 20.0
-METRES_PER_DEGREE = 111_319.5
-"""Of latitude; for places a few metres apart."""
+METRES_PER_DEGREE = 111_319.5  # of latitude; for places a few metres apart
 
 
 @contextmanager

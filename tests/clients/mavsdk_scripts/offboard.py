@@ -11,8 +11,7 @@ PLACES_NED_YAW = ((4.0, 0.0, -4.0, 90.0), (0.0, 3.0, -6.0, 0.0))
 VELOCITIES_NED_YAW = ((2.0, 0.0, 0.0, 0.0), (0.0, 1.5, 0.0, 90.0), (0.0, 0.0, 0.5, 90.0))
 SPEED_M_S, YAW_RATE_DEG_S = 2.0, 45.0
 ROLLS_DEG = (15.0, -15.0, 0.0)
-HOVER = 0.34
-"""Part of the largest thrust that carries this vehicle."""
+HOVER = 0.34  # part of the largest thrust that carries this vehicle
 
 
 def position(vehicle: Any) -> None:

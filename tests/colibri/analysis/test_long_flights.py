@@ -27,8 +27,7 @@ from colibri.mavlink.ulog.log import MemoryLog, beginning
 
 A_BLOCK, SOME_ROWS, ALL_ROWS = 1, 200, 1 << 30
 SUMMARY = FrameCount(1.0, 1, 0)
-MAX_BYTES_A_SAMPLE = 100
-"""A row of the table alone has 216, and its text 500."""
+MAX_BYTES_A_SAMPLE = 100  # a row of the table alone has 216, and its text 500
 
 
 @pytest.fixture(scope="module")

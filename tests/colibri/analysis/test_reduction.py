@@ -17,8 +17,7 @@ from colibri.common.types import Array
 
 HOUR = np.arange(450_000, dtype=np.float64) * 0.008
 KINDS = [Extremes, EveryNth]
-MAX_DIFFERENT = 0.005
-"""Part of the pixels that may look different: where a curve's edge lies between two."""
+MAX_DIFFERENT = 0.005  # part of the pixels that may look different: where a curve's edge lies between two
 
 
 def rows_of(count: int) -> Array:

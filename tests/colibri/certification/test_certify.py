@@ -24,8 +24,7 @@ HERE = Path(__file__).parent
 CONDITIONS, VEHICLE = CertifiedConditions(0.01, 0.5), load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
 FLIGHT = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
-CERTIFIED = read_certificate(HERE / "lpv-mpc.json")
-"""Of profile flight, as `colibri certify` wrote it."""
+CERTIFIED = read_certificate(HERE / "lpv-mpc.json")  # of profile flight, as `colibri certify` wrote it
 
 
 def test_the_certificate_is_of_what_flies() -> None:

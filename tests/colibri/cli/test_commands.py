@@ -19,8 +19,7 @@ from colibri.flights.provenance import plan_of
 from tests.support.commands import FLIGHT, VEHICLE, Ran, Refused, edited, exit_code
 
 FIGURES = ("trajectory", "position", "attitude", "inputs", "rotors", "error")
-MAX_HELP_S = 0.2
-"""Of a core, startup of Python included."""
+MAX_HELP_S = 0.2  # of a core, startup of Python included
 HELP = """
 import sys
 from colibri.cli.options import SHELLS

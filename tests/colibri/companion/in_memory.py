@@ -16,8 +16,7 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.vehicle import Sitl
 from tests.colibri.companion.stand_in import StandIn
 
-AHEAD_US = 7_654_321
-"""The companion's clock is ahead of the vehicle's by this."""
+AHEAD_US = 7_654_321  # the companion's clock is ahead of the vehicle's by this
 NO_LAW_CLOCK = 0.0
 
 

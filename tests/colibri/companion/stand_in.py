@@ -18,8 +18,7 @@ from colibri.mavlink.wire.dialect import Bits, Codec, Message, definition_of, ma
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 STEP_US = 4_000
-BOOTED_US = 3_000_000
-"""The clock of a vehicle began before anybody listened."""
+BOOTED_US = 3_000_000  # the clock of a vehicle began before anybody listened
 GRAVITY = 9.81
 _PARTS = 4
 PX4_HOLD, PX4_TAKEOFF, PX4_OFFBOARD = (main << 16 | sub << 24 for main, sub in ((4, 3), (4, 2), (6, 0)))

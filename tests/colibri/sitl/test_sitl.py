@@ -20,8 +20,7 @@ pytest_plugins = ["pytester"]
 
 DOCS = ROOT / "docs" / "scenarios.md"
 MODULE = "colibri.pytest_plugin"
-KNOWN = ("-W", "ignore::pytest.PytestUnknownMarkWarning")
-"""Lets a test have an unregistered mark."""
+KNOWN = ("-W", "ignore::pytest.PytestUnknownMarkWarning")  # lets a test have an unregistered mark
 CACHES = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
 HOVER = """
     import pytest

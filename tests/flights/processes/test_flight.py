@@ -14,8 +14,7 @@ from tools.harness.processes import fly, rows, topic_rows
 
 HUMMINGBIRD = colibri.load_vehicle("hummingbird")
 IDLE, MAX_SPEED = 83.8, 838.0
-FEW_STARTS = 6
-"""Of the 50 that `make test-long` flies, for longer."""
+FEW_STARTS = 6  # of the 50 that `make test-long` flies, for longer
 
 
 @pytest.mark.parametrize(

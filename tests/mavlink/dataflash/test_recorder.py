@@ -32,8 +32,7 @@ FLYING = TelemetrySnapshot(
         (31.0, 42.0, 13.0), (0.5, 1.5, 2.5), (0.0, 0.1, 0.2), attitude=quaternion_from_euler(0.0, 0.0, pi)
     ),
 )
-BOOT_UNIX_US = 1_704_067_200_000_000
-"""2024-01-01, a Monday: one day and 18 leap seconds into GPS week 2295."""
+BOOT_UNIX_US = 1_704_067_200_000_000  # 2024-01-01, a Monday: one day and 18 leap seconds into GPS week 2295
 
 
 def read(tmp_path: Path, *snapshots: TelemetrySnapshot, boot_unix_us: int = 0) -> dict[str, list[Any]]:

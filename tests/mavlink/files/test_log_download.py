@@ -12,8 +12,7 @@ from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
 from tests.support.messages import GROUND, OTHER, message, on_the_wire
 
-CHUNK = 128 * BLOCK_BYTES
-"""What MAVSDK asks for at once."""
+CHUNK = 128 * BLOCK_BYTES  # what MAVSDK asks for at once
 ALL = 0xFFFFFFFF
 BIG = random.Random(1).randbytes(30_001)
 CONTENT = {"00001.ulg": BIG, "00002.ulg": b"", "00003.ulg": bytes(range(180))}

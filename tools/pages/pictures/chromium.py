@@ -18,8 +18,7 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )
 SIZE = (1280, 800)
-WITHIN_MS = 60_000
-"""Without a GPU a picture takes seconds."""
+WITHIN_MS = 60_000  # without a GPU a picture takes seconds
 _KNOWN_WARNINGS = ("THREE.Clock", "Evaluating a string as JavaScript")
 """The second: viser's sorter of Gaussian splats is refused."""
 

@@ -14,12 +14,10 @@ from colibri.experiments.flight import SampleTable
 from colibri.plant.vehicle.description import load_vehicle
 
 LAP_S = 6.0
-FROM_S = 24.0
-"""By then nothing is left of the start."""
+FROM_S = 24.0  # by then nothing is left of the start
 FRAMES_A_SECOND = 10
 _TRAIL_S = 1.6
-_ARM_M = 0.45
-"""Longer than the vehicle's own, so that it is seen."""
+_ARM_M = 0.45  # longer than the vehicle's own, so that it is seen
 _THRUST_M_N = 0.16
 _GROUND, _AIR, _TRACK, _BODY, _THRUST = "#7d8a99", "#D55E00", "#b6c2cf", "#223344", "#0072B2"
 

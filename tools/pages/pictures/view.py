@@ -31,8 +31,7 @@ from tools.pages.pictures.chromium import Tab, chromium
 from tools.pages.pictures.watched import Watched
 
 FRAME_S, PLOTTED_AGAIN = 0.1, 8
-DRAWN_AFTER_MS = 15000
-"""Without a GPU a picture takes seconds."""
+DRAWN_AFTER_MS = 15000  # without a GPU a picture takes seconds
 COLOURS = 160
 KNOWN_AFTER_S, ON_ITS_WAY_S, PATIENCE_S, NEAR_M = 10.0, 3.0, 60.0, 0.5
 PLACES_M = ((0.0, 0.0, 4.0), (8.0, 0.0, 4.0), (8.0, 6.0, 5.0), (0.0, 6.0, 5.0))

@@ -16,8 +16,7 @@ from tests.support.states import state_of
 
 HUMMINGBIRD = load_vehicle("hummingbird")
 SAMPLE_US = 8000
-WITHIN_SAMPLES = 6
-"""A twentieth of a second."""
+WITHIN_SAMPLES = 6  # a twentieth of a second
 WHOLE = Physics(HUMMINGBIRD, "rk4")
 LEVEL = Start(z=50.0, rotors=4740.0)
 

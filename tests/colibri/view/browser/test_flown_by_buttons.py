@@ -10,8 +10,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from tools.harness.processes import vehicle
 
 pytestmark = pytest.mark.view
-HEIGHT_M = 3.0
-"""As the page proposes."""
+HEIGHT_M = 3.0  # as the page proposes
 NEAR_M = 0.2
 
 

@@ -7,8 +7,7 @@ import pytest
 from PIL import Image
 
 pytestmark = pytest.mark.view
-CLEARLY = 50
-"""By how much one part of a colour is stronger than another where something has that colour."""
+CLEARLY = 50  # by how much one part of a colour is stronger than another where something has that colour
 
 
 def test_a_mission_inside_its_fence_is_drawn(tmp_path: Path) -> None:
