@@ -30,10 +30,8 @@ from colibri.mavlink.wire.dialect import Codec, mav
 
 class Severity(StrEnum):
     FINE = "fine"
-    NOTE = "note"
-    """Flights work, with a remark."""
-    FAILED = "failed"
-    """Flights cannot work, or not with a ground station."""
+    NOTE = "note"  # flights work, with a remark
+    FAILED = "failed"  # flights cannot work, or not with a ground station
 
 
 class Finding(NamedTuple):

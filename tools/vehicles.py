@@ -41,8 +41,7 @@ class Trial(NamedTuple):
     options: Callable[[Vehicle], dict[str, Any]]
     duration_s: float
     off_m: float = OFF_M
-    assumed: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle
-    """The vehicle that the law assumes."""
+    assumed: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle  # the vehicle that the law assumes
 
 
 def acceleration_m_s2(vehicle: Vehicle) -> float:

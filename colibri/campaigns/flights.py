@@ -35,14 +35,10 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 class Verdict(StrEnum):
     FLOWN = "flown"
-    LOST = "lost"
-    """Flown to its end, but away from its track."""
-    FAILED = "failed"
-    """Ended early, for example because the control law raised."""
-    REFUSED = "refused"
-    """The factors cannot be combined."""
-    KILLED = "killed"
-    """Its process was killed twice, the second time with this flight alone."""
+    LOST = "lost"  # flown to its end, but away from its track
+    FAILED = "failed"  # ended early, for example because the control law raised
+    REFUSED = "refused"  # the factors cannot be combined
+    KILLED = "killed"  # its process was killed twice, the second time with this flight alone
 
     @property
     def is_lost(self) -> bool:

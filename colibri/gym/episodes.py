@@ -70,8 +70,7 @@ class EpisodesSnapshot(NamedTuple):
 
     arrays: tuple[Any, ...]
     chances: tuple[Mapping[str, Any] | None, ...]
-    flight: Any = None
-    """With actions through the autopilot: the environment's flight, and its snapshot."""
+    flight: Any = None  # with actions through the autopilot: the environment's flight, and its snapshot
 
 
 class Begun(NamedTuple):
@@ -90,8 +89,7 @@ class Begun(NamedTuple):
 class Episodes:
     """Episodes of `count` vehicles, each row with its own random numbers; arguments as in docs/gym.md."""
 
-    near: Mapping[str, Any] = _NEAR
-    """Drawn by default."""
+    near: Mapping[str, Any] = _NEAR  # drawn by default
 
     def __init__(
         self,
