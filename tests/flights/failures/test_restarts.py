@@ -91,9 +91,9 @@ def test_a_restart_is_not_felt_in_hover_and_in_a_turn(
 @pytest.mark.feedback("sensors")
 def test_without_memory_a_vehicle_on_sensors_is_caught(sitl: Sitl, flying_s: float) -> None:
     """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
-    sitl.takeoff(5.0)
+    sitl.takeoff(8.0)
     if flying_s:
-        sitl.goto(60.0, 20.0, 5.0, wait=False)
+        sitl.goto(60.0, 20.0, 8.0, wait=False)
         sitl.run(flying_s)
     height_m, since_s = sitl.position[2], sitl.time_s
     restart(sitl, lambda _: None)
