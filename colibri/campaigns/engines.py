@@ -65,7 +65,10 @@ class Pool:
         """Yield jobs with results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
         context = get_context("spawn")
-        has_begun = context.Event()
+        try:
+            has_begun = context.Event()
+        except OSError as error:
+            raise CampaignError(f"worker processes need /dev/shm to be writable: {error.strerror}") from None
         pool = ProcessPoolExecutor(workers, context, _begin, (packed, has_begun))
         waiting: dict[Future[Any], Job] = {}
         broken: list[Job] = []

@@ -30,7 +30,8 @@ class _Calls:
         finally:
             self._called = None
         try:
-            return kernel.py_func(*map(_with_attributes, args))
+            with np.errstate(all="ignore"):  # as the machine code
+                return kernel.py_func(*map(_with_attributes, args))
         except Exception:  # what Python rejects, as a division by zero: then the compiled one
             return self._call(kernel, *args)
         finally:
