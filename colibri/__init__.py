@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from colibri.common import Table as Table
     from colibri.common import read_settings as read_settings
     from colibri.conformance import check_controller as check_controller
+    from colibri.conformance import check_vehicle as check_vehicle
     from colibri.experiments import Flight as Flight
     from colibri.experiments import fly as fly
     from colibri.experiments import load_flight as load_flight

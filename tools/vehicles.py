@@ -7,26 +7,29 @@ it ends 2 m from its reference or more, upside down, or on the ground.
 import sys
 from argparse import ArgumentParser
 from collections.abc import Callable
-from math import radians, sqrt, tan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import gc_frozen
+from colibri.conformance.vehicle_flights import (
+    FAR_M,
+    HEIGHT_M,
+    HOVER,
+    OFF_M,
+    acceleration_m_s2,
+    lemniscate,
+)
 from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.in_process import put_together
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import RotorLag, Vehicle, load_vehicle
 
-OFF_M, REJOINED_FROM_M, LOST_M = 2.0, 5.0, 2.0
-HEIGHT_M = 12.0
-_PART = 0.6
-_MAX_TILT_DEG = 65.0
+REJOINED_FROM_M = 5.0
 
 
 class Outcome(NamedTuple):
@@ -42,18 +45,6 @@ class Trial(NamedTuple):
     duration_s: float
     off_m: float = OFF_M
     assumed: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle  # the vehicle that the law assumes
-
-
-def acceleration_m_s2(vehicle: Vehicle) -> float:
-    """Return the horizontal acceleration with a sagging battery, within a tilt of 65°."""
-    weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-    ratio = float(vehicle.max_wrench()[0]) * BatteryModel(vehicle).max_common_speed(0.0) ** 2 / weight_n
-    return vehicle.gravity_m_s2 * min(sqrt(max(ratio * ratio - 1.0, 0.01)), tan(radians(_MAX_TILT_DEG)))
-
-
-def lemniscate(vehicle: Vehicle) -> str:
-    """Return the lemniscate of 4 m, which takes 400 m/s² at a lap of 1 s."""
-    return f"lemniscate:height={HEIGHT_M:g},lap={sqrt(400.0 / (_PART * acceleration_m_s2(vehicle))):.2f}"
 
 
 def circle(speed_m_s: float) -> Callable[[Vehicle], dict[str, Any]]:
@@ -77,27 +68,27 @@ def lagging(factor: float) -> Callable[[Vehicle], Vehicle]:
 
 def loaded(vehicle: Vehicle) -> dict[str, Any]:
     return {
-        "track": f"hover:height={HEIGHT_M:g}",
+        "track": HOVER,
         "plant_vehicle": vehicle.replace("body.mass_kg", 1.2 * vehicle.body.mass_kg),
         "wind": "5@270",
     }
 
 
-HOVER = {"track": f"hover:height={HEIGHT_M:g}"}
+HOVERING = {"track": HOVER}
 TRIALS = {
-    "hover": Trial(lambda _: HOVER, 6.0),
+    "hover": Trial(lambda _: HOVERING, 6.0),
     "spiral": Trial(lambda _: {"track": "spiral"}, 6.0),
     "lemniscate": Trial(lambda vehicle: {"track": lemniscate(vehicle)}, 12.0),
     "loaded": Trial(loaded, 14.0),
     "sensors": Trial(lambda _: {"track": "hover:height=3", "feedback": "sensors"}, 14.0, 0.0),
-    "weak": Trial(lambda v: HOVER | {"plant_vehicle": v.replace("rotors.strength", (0.85, 1.0, 1.0, 1.0))}, 9.0),
+    "weak": Trial(lambda v: HOVERING | {"plant_vehicle": v.replace("rotors.strength", (0.85, 1.0, 1.0, 1.0))}, 9.0),
     "at 5 m/s": Trial(circle(5.0), 30.0, REJOINED_FROM_M),
     "at 8 m/s": Trial(circle(8.0), 30.0, REJOINED_FROM_M),
     "at 12 m/s": Trial(circle(12.0), 45.0, REJOINED_FROM_M),
-    "no lag": Trial(lambda v: HOVER | {"plant_vehicle": lagging(0.0)(v)}, 6.0, OFF_M, lagging(0.0)),
-    "half the lag: hover": Trial(lambda v: HOVER | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.5)),
+    "no lag": Trial(lambda v: HOVERING | {"plant_vehicle": lagging(0.0)(v)}, 6.0, OFF_M, lagging(0.0)),
+    "half the lag: hover": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.5)),
     "half the lag": Trial(lambda v: {"track": lemniscate(v), "plant_vehicle": v}, 12.0, OFF_M, lagging(0.5)),
-    "lag unknown": Trial(lambda v: HOVER | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.0)),
+    "lag unknown": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.0)),
 }
 
 
@@ -125,7 +116,7 @@ def _flown(vehicle: Vehicle, trial: Trial, profile: Any, controller: str | None)
     errors = np.linalg.norm(last[:, 7:10] - position(plan.track, last[:, 0]), axis=1)
     rms_m, upright = float(np.sqrt((errors * errors).mean())), 1.0 - 2.0 * (last[:, 11] ** 2 + last[:, 12] ** 2).max()
     grounded = bool((last[:, 9] < 0.1).any()) and vehicle.ground is not None
-    lost = "ground" if grounded else f"{errors.max():.1f} m" if errors.max() > LOST_M else "over" if upright < 0 else ""
+    lost = "ground" if grounded else f"{errors.max():.1f} m" if errors.max() > FAR_M else "over" if upright < 0 else ""
     return Outcome(lost, rms_m, float(np.abs(last[:, 4:7]).max()))
 
 

@@ -4,7 +4,8 @@ A profile holds bases and ratios, in the table `scaling` of the law; a number th
 ratios give the numbers to which the laws were tuned on the Hummingbird. In the formulas:
 
     thrust  largest thrust, in parts of the weight, with a full battery under load
-    climb   g (thrust / 1.1 - 1): acceleration upwards that is left with a tenth more mass
+    climb   g (thrust / 1.1 - 1): acceleration upwards that is left with a tenth more mass; at least a quarter of that
+            without it, g (thrust - 1) / 4
     turn    angular acceleration in hover, about x, y, z, rad/s²
     slow    the slower of the rotors' lags in parts of `lag_s`, at least 1
     lift    moment of one rotor's lift in hover, N m
@@ -22,6 +23,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 _LEAST_THRUST = 1.05
 _PAYLOAD = 1.1
+_LEAST_CLIMB = 0.25
 
 
 class LpvMpcScaling(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -85,8 +87,9 @@ def capability_of(vehicle: Vehicle) -> Capability:
     lag_s = max(rotors.lag.time_constant_up_s, rotors.lag.time_constant_down_s) if rotors.lag else 0.0
     lever_m = float(np.abs(np.array(rotors.position_m)).max())
     x, y, z = turns.tolist()
-    climb_m_s2, lift_n_m = gravity * (most / hover / _PAYLOAD - 1.0), weight_n / len(rotors.position_m) * lever_m
-    return Capability(most / hover, climb_m_s2, (x, y, z), lag_s, lift_n_m, gravity)
+    thrust, lift_n_m = most / hover, weight_n / len(rotors.position_m) * lever_m
+    climb_m_s2 = gravity * max(thrust / _PAYLOAD - 1.0, _LEAST_CLIMB * (thrust - 1.0))
+    return Capability(thrust, climb_m_s2, (x, y, z), lag_s, lift_n_m, gravity)
 
 
 def sagging_speed(vehicle: Vehicle) -> float:

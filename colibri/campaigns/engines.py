@@ -133,10 +133,11 @@ def in_order(
     *,
     quiet: bool,
     keep: Callable[[Result], object] = lambda _result: None,
+    engine: Engine | None = None,
 ) -> list[Result]:
     """Return results in the order of jobs, and `keep` each at once."""
     found: dict[int, Result] = {}
-    with closing(Pool().each(lambda own, job: own(job[1]), work, enumerate(jobs))) as done:
+    with closing((engine or Pool()).each(lambda own, job: own(job[1]), work, enumerate(jobs))) as done:
         for (number, job), result in with_bar(done, title, len(jobs), quiet=quiet):
             if isinstance(result, Killed):
                 raise CampaignError(f"{title}: the process that did {job} was killed, and again when it did this alone")

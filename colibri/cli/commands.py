@@ -71,6 +71,9 @@ _TEXTS = {
         "vehicle cli.descriptions": """write a new vehicle's file, or parameters of PX4 or ArduPilot
             colibri vehicle new x --mass 2 --arm .25 --propeller 1045 --hover-throttle .5
             colibri vehicle hummingbird --for px4 --out hummingbird.params""",
+        "check-vehicle conformance.vehicle_check:command": """fly a vehicle, and find how wrong its numbers may be
+            colibri check-vehicle mine.toml
+            colibri check-vehicle x500 --controller geometric-se3 --json""",
     },
     "control laws": {
         "check-controller conformance.check:command": """test a control law against the requirements for all laws

@@ -239,6 +239,17 @@ def check_controller(parser: ArgumentParser) -> None:
     parser.flag("--quiet", "print failed checks only")
 
 
+def check_vehicle(parser: ArgumentParser) -> None:
+    add = parser.value
+    add("vehicle", "NAME", "vehicle name or .toml")
+    add("--profile", "NAME", "control profile name or .toml", default="flight")
+    add("--controller", "NAME", "control law, as for colibri fly (default: the profile's)")
+    add("--seed", "N", "seed of turbulence and sensors (default %(default)s)", type=natural, default=0)
+    add("--workers", "N", "number of processes (default: one per core)", type=int)
+    parser.flag("--json", "print only the result, as JSON")
+    _out(parser, "out/check-vehicle", "check.json and the figure")
+
+
 def gym(parser: ArgumentParser) -> None:
     add = parser.value
     parser.add_argument("action", choices=["export"], help="write POLICY.toml beside a policy")

@@ -1,4 +1,4 @@
-"""Conformance tests of a control law."""
+"""Conformance tests of a control law, and test flights of a vehicle file."""
 
 from typing import TYPE_CHECKING
 
@@ -16,5 +16,7 @@ if TYPE_CHECKING:
     from colibri.conformance.subject import Result as Result
     from colibri.conformance.subject import Row as Row
     from colibri.conformance.subject import built as built
+    from colibri.conformance.vehicle_check import VehicleCheck as VehicleCheck
+    from colibri.conformance.vehicle_check import check_vehicle as check_vehicle
 else:
     __getattr__, __dir__ = public(__name__)

@@ -118,6 +118,7 @@ def _option(name: str, value: Any) -> str:
 
 class Result(StrEnum):
     OK = "ok"
+    NEAR = "near"  # a limit
     FAILED = "failed"
     NOT_APPLICABLE = "not applicable"
     FIGURE = "figure"

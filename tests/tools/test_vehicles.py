@@ -58,3 +58,5 @@ def test_a_vehicle_too_heavy_for_its_rotors_is_refused() -> None:
     with pytest.raises(SettingsError, match=r"the largest thrust is 1\.04 times the weight: at least 1\.05"):
         scaled("lpv-mpc", TABLE, heavy)
     assert np.isfinite(capability_of(heavy).turn_rad_s2).all()
+    lighter = vehicle.replace("body.mass_kg", 0.935 * capability_of(vehicle).thrust * vehicle.body.mass_kg)
+    assert 0.0 < scaled("lpv-mpc", TABLE, lighter)["guidance"]["max_acceleration_m_s2"] < 1.0

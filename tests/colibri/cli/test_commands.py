@@ -91,7 +91,7 @@ def bash_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("words", "completed"),
     [
-        ("che", {"check-controller"}),
+        ("check-c", {"check-controller"}),
         ("fly sp", {"spiral"}),
         ("fly --profile th", {"thesis", "thesis-euler"}),
         ("fly --feedback s", {"state", "sensors"}),

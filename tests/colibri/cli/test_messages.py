@@ -50,6 +50,8 @@ MESSAGES = [
     ("check-controller lpv-mpc --profile fligt", 'unknown profile "fligt"'),
     ("check-controller lpv-mpc --vehicle dragonfly", 'unknown vehicle "dragonfly"'),
     ("check-controller lpv-mpc --only memories", 'unknown area "memories" (did you mean "memory"?)'),
+    ("check-vehicle hummingbirt", 'unknown vehicle "hummingbirt" (did you mean "hummingbird"?)'),
+    ("check-vehicle x500 --workers 0", "workers: must be a whole number of at least 1, not 0"),
     ("check-controller lpv-mpc --duration 0", "argument --duration: must be above zero"),
     (f"companion --vehicle {LINK}", "name a TRACK to fly, or --identify"),
     (f"companion spirl --vehicle {LINK}", 'unknown track "spirl"'),

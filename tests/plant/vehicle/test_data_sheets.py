@@ -9,9 +9,10 @@ import msgspec
 import pytest
 
 from colibri.common.config import read_settings
+from colibri.conformance.vehicle_flights import OFF_M, lemniscate
 from colibri.plant.vehicle.data_sheets import LAYOUTS, ORDERS, DataSheet, propeller_of, thrust_stand_of, vehicle_file
 from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
-from tools.vehicles import OFF_M, Trial, fly, lemniscate
+from tools.vehicles import Trial, fly
 
 X500 = DataSheet("mine", 2.0643, 0.25, propeller_of("1045"), kv_rpm_v=920.0, cells=4, hover_throttle=0.6)
 CF21 = DataSheet(
