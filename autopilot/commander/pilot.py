@@ -72,6 +72,7 @@ class Sensed(NamedTuple):
     path_speed: float = 1.0  # rate of path time relative to the clock
     lift: float | None = None  # modelled thrust over weight, once a sensor has failed
     push: float = 0.0
+    drifts: bool = False  # the speed is not measured
 
 
 class PilotRecord(NamedTuple):
@@ -179,7 +180,7 @@ class Pilot:
         self.lag_us += sensed.waited_us
         self.generator.wait(sensed.waited_us * 1e-6, sensed.path_speed)
         self.sensed = sensed
-        self.ground.drifts = not sensed.position_known
+        self.ground.drifts = sensed.drifts
 
     def context(self) -> TaskContext:
         now_us, vehicle, steered, position_known, delay_us, *_ = self.sensed

@@ -49,7 +49,11 @@ class Supervision:
         lift, push, watch = None, 0.0, parts.rotor_loss.watch
         if self._doubts:
             lift, push = watch.expected[2] / parts.loop.vehicle.gravity_m_s2, watch.push
-        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push))
+        estimate = parts.state_source.estimate
+        drifts = not position_known or (estimate is not None and not estimate.speed_known)
+        parts.pilot.sense(
+            Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push, drifts)
+        )
         guard(table.FAILSAFES, self._execute, table.nothing, now_us, state)
         if self._caught_us is not None:
             self._drift(now_us, self._caught_us, state)
@@ -114,6 +118,7 @@ class Supervision:
             pace=pilot.behaviour.limits,
             needs_radio=stations.exempt is not None,
             exempt=_NOTHING if stations.exempt is None else stations.exempt(),
+            caught=self._caught_us is not None,
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.estimation.sensing.rejection import Rejections
+from colibri.autopilot.estimation.sensing.rejection import RejectedSource, Rejections
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import mav
@@ -24,6 +24,7 @@ class Test(NamedTuple):
         return self.nis / self.gate
 
 
+_RECKONED_US = 10_000_000  # an accelerometer integrated for so long is up to 1 m/s off
 Tests: TypeAlias = Mapping[str, Test]  # last test of each measurement, by name
 
 
@@ -108,3 +109,11 @@ class Estimate(NamedTuple):
     resets: int  # number of resets of a part
     smoothing_m: Vector  # filter minus published position
     check: FilterCheck | None  # ten times a second
+
+    @property
+    def speed_known(self) -> bool:
+        """Whether the speed is measured: by GPS, or integrated for a while, with heights by the barometer."""
+        since_us, unused = self.health.gps_lost_since_us, self.health.not_accepted
+        return since_us is None or (
+            self.frame.time_us - since_us < _RECKONED_US and RejectedSource.BAROMETER not in unused
+        )

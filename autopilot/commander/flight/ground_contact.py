@@ -47,7 +47,7 @@ class GroundContact:
 
     Attributes:
         impact: Text, empty for a landing.
-        drifts: Whether its position, and with that its speed, is unknown.
+        drifts: Whether its speed is unknown.
         height_m: Last z of ENU on the ground.
     """
 

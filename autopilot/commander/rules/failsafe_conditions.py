@@ -43,6 +43,7 @@ class FailsafeInputs(NamedTuple):
     pace: Pace
     needs_radio: bool = False  # whether sticks are required in every mode
     exempt: Mapping[Condition, str] = {}  # reported only, with what continues; without effect if that is empty
+    caught: bool = False  # found falling: the attitude is still being found
 
 
 class Conditions:
@@ -151,7 +152,9 @@ def _lacks_plan(decided: Diagnostics) -> bool:
 
 
 HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
-    Condition.ATTITUDE_LOST: lambda inputs, _: inputs.estimate is not None and not inputs.estimate.health.attitude,
+    Condition.ATTITUDE_LOST: lambda inputs, _: (
+        inputs.estimate is not None and not (inputs.estimate.health.attitude or inputs.caught)
+    ),
     Condition.TILTED: _tilted,
     Condition.ROTOR_FAILED: lambda inputs, _: inputs.rotor_lost is not None,
     Condition.POSITION_LOST: lambda inputs, limits: (

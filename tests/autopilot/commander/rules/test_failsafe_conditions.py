@@ -32,6 +32,14 @@ NOW_US = 10_000_000
 NOTHING = (0.0, 0.0, 0.0)
 
 
+KNOWN = Health(*(True,) * 6, False, None, False, *(True,) * 4, ())
+
+
+def estimated(health: Health) -> Estimate:
+    frame = StateFrame(NOW_US, NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING)
+    return Estimate(frame, *(NOTHING,) * 5, health, {}, {}, 0, NOTHING, None)
+
+
 def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleState:
     return WELL.state._replace(velocity_enu_m_s=velocity, position_enu_m=position)
 
@@ -115,11 +123,28 @@ def test_voltage_is_looked_at_where_it_has_a_limit() -> None:
     assert battery_below(FULL, 0.95, 0.0)
 
 
+def test_a_vehicle_caught_in_a_fall_may_find_its_attitude() -> None:
+    lost = WELL._replace(estimate=estimated(KNOWN._replace(attitude=False)))
+    assert Condition.ATTITUDE_LOST in Conditions().look(lost, LIMITS, ())
+    assert Condition.ATTITUDE_LOST not in Conditions().look(lost._replace(caught=True), LIMITS, ())
+
+
+@pytest.mark.parametrize(
+    ("lost_for_s", "unused", "known"),
+    [(None, ("barometer",), True), (9.0, (), True), (9.0, ("barometer",), False), (11.0, (), False)],
+)
+def test_a_speed_that_was_integrated_for_long_is_unknown(
+    lost_for_s: float | None, unused: tuple[str, ...], known: bool
+) -> None:
+    since_us = None if lost_for_s is None else NOW_US - round(lost_for_s * 1e6)
+    health = KNOWN._replace(gps_lost_since_us=since_us, not_accepted=unused)
+    assert estimated(health).speed_known is known
+
+
 @pytest.mark.parametrize(("position_m", "velocity_m_s"), [(1e3, 0.1), (0.1, 1e3)])
 def test_position_is_known_if_both_deviations_are_small(position_m: float, velocity_m_s: float) -> None:
-    small, frame = (0.1, 0.1, 1e3), StateFrame(0, NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING)
-    health = Health(*(True,) * 6, False, None, False, *(True,) * 4, ())
-    sure = Estimate(frame, small, small, NOTHING, NOTHING, NOTHING, health, {}, {}, 0, NOTHING, None)
+    small = (0.1, 0.1, 1e3)
+    sure = estimated(KNOWN)._replace(position_std_m=small, velocity_std_m_s=small)
     assert position_known(sure, LIMITS)
     unsure = sure._replace(position_std_m=(0.1, position_m, 0.1), velocity_std_m_s=(velocity_m_s, 0.1, 0.1))
     assert not position_known(unsure, LIMITS)
