@@ -22,6 +22,7 @@ from colibri.campaigns.run import engine_of
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.conformance.subject import Result
 from colibri.conformance.vehicle_flights import (
+    EMPTY,
     FAR_M,
     MAX_FACTOR,
     NUMBERS,
@@ -29,9 +30,9 @@ from colibri.conformance.vehicle_flights import (
     Flown,
     Tolerance,
     bound_of,
-    emptied,
     fly,
     has_number,
+    thrust_ratio,
 )
 from colibri.flights.folder import make_folder
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -173,15 +174,14 @@ def _done(vehicle: Vehicle, law: Mapping[str, Any], job: _Job) -> Any:
 
 
 def _limits(vehicle: Vehicle, table: Mapping[str, Any]) -> Iterator[Check]:
-    can = capability_of(vehicle)
-    yield _thrust("thrust / weight", can.thrust)
+    yield _thrust("thrust / weight", thrust_ratio(vehicle))
     if vehicle.battery is not None:
-        yield _thrust("thrust / weight, battery empty", capability_of(emptied(vehicle)).thrust)
-    slow_s = table.get("scaling", {}).get("lag_s")
+        yield _thrust("thrust / weight, battery empty", thrust_ratio(vehicle, EMPTY))
+    lag_s, slow_s = capability_of(vehicle).lag_s, table.get("scaling", {}).get("lag_s")
     if slow_s is not None and vehicle.rotors.lag is not None:
-        near = can.lag_s > slow_s
-        why = f"the law is slowed down by {can.lag_s / slow_s:.1f}" if near else ""
-        yield Check("rotor lag", Result.NEAR if near else Result.OK, 1e3 * can.lag_s, 1e3 * slow_s, None, "ms", why)
+        near = lag_s > slow_s
+        why = f"slows the law down, {lag_s / slow_s:.1f} times" if near else ""
+        yield Check("rotor lag", Result.NEAR if near else Result.OK, 1e3 * lag_s, 1e3 * slow_s, None, "ms", why)
 
 
 def _thrust(name: str, ratio: float) -> Check:

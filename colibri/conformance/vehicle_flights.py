@@ -25,7 +25,7 @@ PART = 0.6
 """Acceleration of the lemniscate, in parts of the vehicle's."""
 FAR_M = 2.0  # an error above it is a loss
 _MAX_TILT_DEG = 65.0
-_EMPTY = 0.9  # charge taken, in parts of the capacity
+EMPTY = 0.9  # charge taken, in parts of the capacity
 HOVER = f"hover:height={HEIGHT_M:g}"
 
 
@@ -47,10 +47,16 @@ class Flown(NamedTuple):
     swing_rad_s: float
 
 
+def thrust_ratio(vehicle: Vehicle, used: float = 0.0) -> float:
+    """Return the largest thrust, in parts of the weight, with a part of the battery's charge used."""
+    charge_ah = used * vehicle.battery.capacity_ah if vehicle.battery else 0.0
+    top, weight_n = BatteryModel(vehicle).max_common_speed(charge_ah), vehicle.body.mass_kg * vehicle.gravity_m_s2
+    return float(vehicle.max_wrench()[0]) * top * top / weight_n
+
+
 def acceleration_m_s2(vehicle: Vehicle) -> float:
     """Return the horizontal acceleration with a sagging battery, within a tilt of 65°."""
-    weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-    ratio = float(vehicle.max_wrench()[0]) * BatteryModel(vehicle).max_common_speed(0.0) ** 2 / weight_n
+    ratio = thrust_ratio(vehicle)
     return vehicle.gravity_m_s2 * min(sqrt(max(ratio * ratio - 1.0, 0.01)), tan(radians(_MAX_TILT_DEG)))
 
 
@@ -63,7 +69,7 @@ def emptied(vehicle: Vehicle) -> Vehicle:
     """Return the vehicle with a nearly empty battery."""
     battery = vehicle.battery
     assert battery is not None, "a trial that requires a battery"
-    voltage_v = battery.full_voltage_v + _EMPTY * (battery.empty_voltage_v - battery.full_voltage_v)
+    voltage_v = battery.full_voltage_v + EMPTY * (battery.empty_voltage_v - battery.full_voltage_v)
     top = vehicle.rotors.max_speed * voltage_v / battery.full_voltage_v
     return vehicle.replace("battery.full_voltage_v", voltage_v).replace("rotors.max_speed", top)
 
