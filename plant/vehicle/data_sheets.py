@@ -33,6 +33,8 @@ _TOY_M = 0.1  # smaller propellers are steep, and have more drag for their thrus
 _LOADED: dict[Motor, float] = {"brushless": 0.65, "brushed": 0.45}  # speed at full throttle over KV times voltage
 _APART, _IN_WAKE = 0.1, 0.85
 """Coaxial rotors: half of what they are apart, in diameters; thrust of the lower one, by measurements of 0.8 to 0.9."""
+_AIR_KG_M3, _BODY_KG_M3, _DRAG_COEFFICIENT, _AIRSPEED_M_S = 1.2, 400.0, 1.2, 5.0
+"""Drag of a body with battery and motors: small ones are light for their size, as area grows with mass to the 2/3."""
 _OTHER = {"ccw": "cw", "cw": "ccw"}
 _UNITS = {
     "throttle": {"": 1.0, "percent": 0.01, "pct": 0.01, "%": 0.01},
@@ -254,11 +256,12 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     spins = [_OTHER[spin] if reverse else spin for _, spin, _ in motors]
     plane = mass * arm * arm
     inertia = sheet.inertia_kg_m2 or (0.27 * plane, 0.27 * plane, 0.48 * plane)
-    lag = sheet.lag_s or (0.15 if sheet.motor == "brushed" else max(0.05 * size / 0.254, 0.02))
+    lag = sheet.lag_s or (0.14 if sheet.motor == "brushed" else max(0.05 * size / 0.254, 0.02))
     drag, cells = sheet.drag_n_s_m, sheet.cells or 0
     pitch = "" if sheet.propeller.pitch_given else "; pitch estimated"
     by = "brushes" if sheet.motor == "brushed" else "size"
-    estimated_drag = "estimated, by mass; of the rotors by tip speed in hover"
+    body_drag = 0.5 * _AIR_KG_M3 * _DRAG_COEFFICIENT * (mass / _BODY_KG_M3) ** (2.0 / 3.0) * _AIRSPEED_M_S
+    estimated_drag = "estimated, by the size of a body of 400 kg/m³, at 5 m/s; of the rotors by tip speed in hover"
     return {
         "name": '"' + sheet.name.replace("\\", "\\\\").replace('"', '\\"') + '"',
         "mass": _text(mass),
@@ -278,7 +281,7 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         "strength": _strength(motors),
         "lag": _text(lag),
         "lag_from": "given" if sheet.lag_s else f"estimated, high, by {by}",
-        "drag": _texts((0.05 * mass, 0.05 * mass, 0.08 * mass) if drag is None else (drag, drag, drag)),
+        "drag": _texts((body_drag, body_drag, 1.6 * body_drag) if drag is None else (drag, drag, drag)),
         "drag_from": estimated_drag if drag is None else "given, with the rotors'",
         "rotor_drag": _text(1.2 * mass * _GRAVITY_M_S2 / (2.0 * size * hover * hover) if drag is None else 0.0),
         "feet": ", ".join(_texts((0.6 * x, 0.6 * y)) for x, y, *_ in dict.fromkeys(place[:2] for place in places)),

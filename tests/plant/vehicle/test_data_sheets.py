@@ -67,6 +67,12 @@ def test_a_vehicle_from_data_sheets_flies_the_true_one() -> None:
     assert outcome.rms_m < 0.1 * CF21.arm_m
 
 
+def test_without_its_drag_a_small_vehicle_still_flies_within_a_quarter_of_its_arm() -> None:
+    true, found = load_vehicle(str(TRUE_CF21)), written(CF21._replace(drag_n_s_m=None))
+    options = {"track": lemniscate(true), "plant_vehicle": true}
+    assert fly(true, Trial(lambda _: options, 12.0, OFF_M, lambda _: found)).rms_m < 0.25 * CF21.arm_m
+
+
 def test_a_thrust_stand_wins_over_estimates() -> None:
     vehicle = written(X500._replace(hover_throttle=None, stand=thrust_stand_of(STAND)))
     assert vehicle.rotors.max_speed == pytest.approx(837.76, rel=1e-4)
