@@ -1,7 +1,7 @@
 """A geometric tracking controller on SE(3), as a baseline for the LPV-MPC.
 
 T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; equation numbers
-in brackets. In ENU and FLU gravity and thrust change sign. All loops are critically damped.
+in brackets. In ENU and FLU gravity and thrust change sign. All loops are critically damped. Commands lead slow rotors.
 """
 
 from collections.abc import Mapping
@@ -14,10 +14,11 @@ from colibri.autopilot.control.parts.recovery import mix_with_priority
 from colibri.autopilot.control.scaling import capability_of, sagging_speed, scaled
 from colibri.autopilot.control.settings import ControlInterval, interval_us
 from colibri.autopilot.control.vehicle_model.mixer import mixing_of
+from colibri.autopilot.control.vehicle_model.rotor_lag import SampledLag, lead, rotor_lag
 from colibri.common.compiled_rotations import quaternion_from_euler
-from colibri.common.config import Positive, Table, read_settings
+from colibri.common.config import NotNegative, Positive, Table, read_settings
 from colibri.common.elementary import square
-from colibri.common.kernels import asin, atan2, cos, sin
+from colibri.common.kernels import asin, atan2, cos, exp, sin
 from colibri.common.matrices import dot, matmul, matvec, norm
 from colibri.common.rotations import nearest_turn, rotation_matrix
 from colibri.common.types import Array
@@ -25,7 +26,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 _MIN_FORCE = 0.05  # least demanded force in parts of the weight: a smaller one has no useful direction
 _SATURATING_RAD = 0.13  # least attitude error that may saturate the moments: at less, the loop is unstable in wind
-_MIN_FEEDBACK = 0.05  # least limit of the feedback in parts of gravity, else what is left beside hover with a payload
+_MIN_FEEDBACK = 0.5  # least limit of the feedback in parts of gravity, else what is left beside hover with a payload
 _MIN_LIFT = 0.5  # near the ground: least lift in parts of the weight, at which the target is level
 
 
@@ -36,6 +37,8 @@ class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
     position_frequency_rad_s: Positive
     attitude_frequency_rad_s: Positive
     yaw_frequency_rad_s: Positive
+    rotor_lag_s: NotNegative = 0.0
+    """Lag of the forces with commands that lead. 0: commands do not lead."""
 
 
 class AttitudeTarget(NamedTuple):
@@ -48,7 +51,7 @@ class AttitudeTarget(NamedTuple):
 class GeometricController:
     """The control law."""
 
-    reads_motion = False
+    reads_motion = True
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         del clock
@@ -68,6 +71,7 @@ class GeometricController:
         top = square(vehicle.rotors.max_speed)
         self._mixing = mixing_of(vehicle.allocation() * top)
         self._top_speed = vehicle.rotors.max_speed
+        self._lag = _led_lag(vehicle, settings, 1e-6 * self.control_interval_us)
         self._squared = square(vehicle.rotors.idle_speed) / top, square(sagging_speed(vehicle))
         self._max_feedback_m_s2 = max(capability_of(vehicle).climb_m_s2, _MIN_FEEDBACK * vehicle.gravity_m_s2)
 
@@ -82,7 +86,7 @@ class GeometricController:
         target = track_direction(acceleration, jerk, float(references.yaw_rad[0]), float(references.yaw_rate_rad_s[0]))
         thrust_n = self._mass_kg * dot(acceleration, R[:, 2])  # [15]
         moment_n_m = self._moment(R, rate, target)
-        speeds = self._rotor_speeds(max(thrust_n, 0.0), moment_n_m)
+        speeds = self._rotor_speeds(state, max(thrust_n, 0.0), moment_n_m)
         return None, Decision(speeds, euler_of(target.rotation, float(references.yaw_rad[0])))
 
     def step_attitude(
@@ -96,7 +100,7 @@ class GeometricController:
             body_rate_of(phi, theta, demand.angle_rates_rad_s[0]),
         )
         moment_n_m = self._moment(R, np.array(state.rate_flu_rad_s), target)
-        speeds = self._rotor_speeds(max(float(demand.thrust_n[0]), 0.0), moment_n_m)
+        speeds = self._rotor_speeds(state, max(float(demand.thrust_n[0]), 0.0), moment_n_m)
         return None, Decision(speeds, (phi, theta, psi))
 
     def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
@@ -120,9 +124,12 @@ class GeometricController:
             jerk = jerk - self._k_position * velocity_error - self._k_velocity * (lifted - wanted)
         return force, jerk
 
-    def _rotor_speeds(self, thrust_n: float, moment_n_m: Array) -> Array:
+    def _rotor_speeds(self, state: VehicleState, thrust_n: float, moment_n_m: Array) -> Array:
         least, most = self._squared
         squared = mix_with_priority(thrust_n, moment_n_m, self._mixing, least, most)
+        if self._lag is not None:
+            led = lead(np.array(state.rotor_speeds) / self._top_speed, squared, self._lag, float(np.sqrt(most)))
+            return led * self._top_speed
         speeds: Array = np.sqrt(squared) * self._top_speed
         return speeds
 
@@ -143,6 +150,14 @@ class GeometricController:
         gyroscopic = np.cross(rate, self._inertia * rate) - self._inertia * np.cross(rate, carried)
         moment: Array = feedback + gyroscopic
         return moment
+
+
+def _led_lag(vehicle: Vehicle, settings: GeometricSettings, interval_s: float) -> SampledLag | None:
+    """Return the lag of rotors that are slower than the settings' lag."""
+    wanted_s = settings.rotor_lag_s
+    if not 0.0 < wanted_s < capability_of(vehicle).lag_s:
+        return None
+    return rotor_lag(vehicle, interval_s)._replace(planned=1.0 - exp(-interval_s / wanted_s))
 
 
 def _max_frequency_rad_s(vehicle: Vehicle) -> float:

@@ -115,6 +115,10 @@ def _slowed(name: str, power: float) -> Callable[[Capability, Any], Any]:
     return value
 
 
+def _led_lag(vehicle: Capability, ratios: GeometricScaling) -> float:
+    return 0.5 * _slowed("lag_s", 0.75)(vehicle, ratios) if vehicle.lag_s > ratios.lag_s else 0.0
+
+
 def _acceleration(vehicle: Capability, ratios: LpvMpcScaling) -> float:
     most = ratios.max_g * vehicle.gravity_m_s2 / sqrt(_slow(vehicle, ratios))
     return min(ratios.acceleration * vehicle.climb_m_s2, most)
@@ -149,9 +153,10 @@ _LPV_MPC = {
     "fallback.rate_1_s": ScalingRule("rate_1_s / slow", _slowed("rate_1_s", -1.0)),
 }
 _GEOMETRIC = {
-    "position_frequency_rad_s": ScalingRule("position_rad_s / slow", _slowed("position_rad_s", -1.0)),
-    "attitude_frequency_rad_s": ScalingRule("attitude_rad_s / slow", _slowed("attitude_rad_s", -1.0)),
+    "position_frequency_rad_s": ScalingRule("position_rad_s / slow^¾", _slowed("position_rad_s", -0.75)),
+    "attitude_frequency_rad_s": ScalingRule("attitude_rad_s / slow^¾", _slowed("attitude_rad_s", -0.75)),
     "yaw_frequency_rad_s": ScalingRule("yaw_rad_s / slow", _slowed("yaw_rad_s", -1.0)),
+    "rotor_lag_s": ScalingRule("lag_s × slow^¾ / 2, if slow > 1", _led_lag),
 }
 LAWS: dict[str, tuple[type[Table], dict[str, ScalingRule]]] = {
     "lpv-mpc": (LpvMpcScaling, _LPV_MPC),

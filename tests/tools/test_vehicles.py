@@ -32,6 +32,13 @@ def test_every_vehicle_flies_by_its_file_alone(vehicle: str, trial: str, rms_m: 
     assert outcome.rms_m < rms_m
 
 
+@pytest.mark.parametrize(("vehicle", "trial"), [("r26", "lemniscate"), ("cf21", "loaded"), ("heavy30", "sensors")])
+def test_the_baseline_flies_slow_rotors(vehicle: str, trial: str) -> None:
+    outcome = fly(load_vehicle(str(FILES / f"{vehicle}.toml")), TRIALS[trial], controller="geometric-se3")
+    assert not outcome.lost
+    assert outcome.rate_rad_s < 3.0
+
+
 def test_the_hummingbird_has_the_numbers_to_which_the_law_was_tuned() -> None:
     found = scaled("lpv-mpc", TABLE, load_vehicle("hummingbird"))
     assert found["guidance"]["poles"] == [-7.0, -8.0]
