@@ -1,50 +1,19 @@
 """`python -m tools.vehicles FOLDER`: whether a law flies every vehicle of a folder.
 
-Flights start in hover 2 m off the track. Lemniscates require 60 % of the vehicle's acceleration. A flight is lost if
-it ends 2 m from its reference or more, upside down, or on the ground.
+Flights and their losses are those of `colibri check-vehicle`.
 """
 
 import sys
 from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.common.errors import Error
-from colibri.common.process.lifecycle import gc_frozen
-from colibri.conformance.vehicle_flights import (
-    FAR_M,
-    HEIGHT_M,
-    HOVER,
-    OFF_M,
-    acceleration_m_s2,
-    lemniscate,
-)
-from colibri.flights.flight import Direct, SteppedFlight
-from colibri.flights.in_process import put_together
-from colibri.flights.plan import FlightPlan
-from colibri.flights.spec import FlightSpec
+from colibri.conformance.vehicle_flights import HEIGHT_M, HOVER, Flown, Trial, acceleration_m_s2, lemniscate
+from colibri.conformance.vehicle_flights import fly as fly_trial
 from colibri.plant.vehicle.description import RotorLag, Vehicle, load_vehicle
 
 REJOINED_FROM_M = 5.0
-
-
-class Outcome(NamedTuple):
-    lost: str  # empty: not lost
-    rms_m: float  # over the last third
-    rate_rad_s: float  # largest body rate over the last third: a limit cycle
-
-
-class Trial(NamedTuple):
-    """A kind of flight: track and options for a vehicle."""
-
-    options: Callable[[Vehicle], dict[str, Any]]
-    duration_s: float
-    off_m: float = OFF_M
-    assumed: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle  # the vehicle that the law assumes
 
 
 def circle(speed_m_s: float) -> Callable[[Vehicle], dict[str, Any]]:
@@ -80,44 +49,28 @@ TRIALS = {
     "spiral": Trial(lambda _: {"track": "spiral"}, 6.0),
     "lemniscate": Trial(lambda vehicle: {"track": lemniscate(vehicle)}, 12.0),
     "loaded": Trial(loaded, 14.0),
-    "sensors": Trial(lambda _: {"track": "hover:height=3", "feedback": "sensors"}, 14.0, 0.0),
+    "sensors": Trial(lambda _: {"track": "hover:height=3", "feedback": "sensors"}, 14.0, off_m=0.0),
     "weak": Trial(lambda v: HOVERING | {"plant_vehicle": v.replace("rotors.strength", (0.85, 1.0, 1.0, 1.0))}, 9.0),
-    "at 5 m/s": Trial(circle(5.0), 30.0, REJOINED_FROM_M),
-    "at 8 m/s": Trial(circle(8.0), 30.0, REJOINED_FROM_M),
-    "at 12 m/s": Trial(circle(12.0), 45.0, REJOINED_FROM_M),
-    "no lag": Trial(lambda v: HOVERING | {"plant_vehicle": lagging(0.0)(v)}, 6.0, OFF_M, lagging(0.0)),
-    "half the lag: hover": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.5)),
-    "half the lag": Trial(lambda v: {"track": lemniscate(v), "plant_vehicle": v}, 12.0, OFF_M, lagging(0.5)),
-    "lag unknown": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0, OFF_M, lagging(0.0)),
+    "at 5 m/s": Trial(circle(5.0), 30.0, off_m=REJOINED_FROM_M),
+    "at 8 m/s": Trial(circle(8.0), 30.0, off_m=REJOINED_FROM_M),
+    "at 12 m/s": Trial(circle(12.0), 45.0, off_m=REJOINED_FROM_M),
+    "no lag": Trial(lambda v: HOVERING | {"plant_vehicle": lagging(0.0)(v)}, 6.0),
+    "half the lag: hover": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0),
+    "half the lag": Trial(lambda v: {"track": lemniscate(v), "plant_vehicle": v}, 12.0),
+    "lag unknown": Trial(lambda v: HOVERING | {"plant_vehicle": v}, 8.0),
 }
+ASSUMED = {
+    "no lag": lagging(0.0),
+    "half the lag: hover": lagging(0.5),
+    "half the lag": lagging(0.5),
+    "lag unknown": lagging(0.0),
+}
+"""Vehicles that the law assumes, where it is another one."""
 
 
-def fly(vehicle: Vehicle, trial: Trial, profile: Any = "flight", controller: str | None = None) -> Outcome:
-    try:
-        return _flown(vehicle, trial, profile, controller)
-    except Error as error:
-        return Outcome(f"{error}"[:60], np.inf, np.inf)
-
-
-def _flown(vehicle: Vehicle, trial: Trial, profile: Any, controller: str | None) -> Outcome:
-    options: dict[str, Any] = {"profile": profile, "controller": controller, "vehicle": trial.assumed(vehicle)}
-    options |= {"link": "direct", **trial.options(vehicle)}
-    plan = FlightPlan.of(FlightSpec.of(**options))
-    if trial.off_m:
-        x, y, z = position(plan.track, np.zeros(1))[0]
-        flown = plan.plant_vehicle if plan.spec.plant_vehicle is None else vehicle
-        start = {"x": x, "y": y - trial.off_m, "z": z, "rotors": flown.hover_rpm}
-        plan = FlightPlan.of(FlightSpec.of(**options, start=start))
-    autopilot, plant = put_together(plan, lambda: 0.0)
-    with gc_frozen():
-        samples = SteppedFlight(plant, autopilot, Direct()).samples(trial.duration_s)
-        flight = np.array([(sample.world.time_us * 1e-6, *sample.world.state) for sample in samples])
-    last = flight[len(flight) * 2 // 3 :]
-    errors = np.linalg.norm(last[:, 7:10] - position(plan.track, last[:, 0]), axis=1)
-    rms_m, upright = float(np.sqrt((errors * errors).mean())), 1.0 - 2.0 * (last[:, 11] ** 2 + last[:, 12] ** 2).max()
-    grounded = bool((last[:, 9] < 0.1).any()) and vehicle.ground is not None
-    lost = "ground" if grounded else f"{errors.max():.1f} m" if errors.max() > FAR_M else "over" if upright < 0 else ""
-    return Outcome(lost, rms_m, float(np.abs(last[:, 4:7]).max()))
+def fly(vehicle: Vehicle, trial: str, profile: Any = "flight", controller: str | None = None) -> Flown:
+    assumed = ASSUMED[trial](vehicle) if trial in ASSUMED else vehicle
+    return fly_trial(vehicle, TRIALS[trial], {"profile": profile, "controller": controller}, assumed)
 
 
 def main() -> int:
@@ -134,10 +87,10 @@ def main() -> int:
     _write("vehicle", *names)
     _write(*["---"] * (len(names) + 1))
     for file in files:
-        outcomes = [fly(load_vehicle(str(file)), TRIALS[name], args.profile, args.controller) for name in names]
+        outcomes = [fly(load_vehicle(str(file)), name, args.profile, args.controller) for name in names]
         for name, outcome in zip(names, outcomes, strict=True):
             lost[name] += bool(outcome.lost)
-        _write(file.stem, *(f"lost: {it.lost}" if it.lost else f"{it.rms_m:.2g}" for it in outcomes))
+        _write(file.stem, *(it.lost[:60] or f"{it.error_m:.2g}" for it in outcomes))
     _write(f"lost of {len(files)}", *map(str, lost.values()))
     return int(any(lost.values()))
 

@@ -25,8 +25,8 @@ def draw_tolerances(title: str, tolerances: Sequence[Tolerance]) -> Figure:
         result = tolerances[place].result
         label = "near a limit" if result is Result.NEAR else "flown"
         axes.barh(-place, most.factor - least.factor, 0.6, least.factor, color=_COLORS[result], label=label)
-        axes.text(least.factor / 1.04, -place, _text(least), ha="right", va="center", fontsize="small")
-        axes.text(most.factor * 1.04, -place, _text(most), ha="left", va="center", fontsize="small")
+        axes.text(least.factor / 1.04, -place, _text(least, "below"), ha="right", va="center", fontsize="small")
+        axes.text(most.factor * 1.04, -place, _text(most, "above"), ha="left", va="center", fontsize="small")
     axes.axvline(1.0, color="black", linewidth=1.0)
     axes.set_xscale("log")
     axes.set_xlim(1.0 / (MAX_FACTOR * _ROOM), MAX_FACTOR * _ROOM)
@@ -41,6 +41,5 @@ def draw_tolerances(title: str, tolerances: Sequence[Tolerance]) -> Figure:
     return figure
 
 
-def _text(bound: Bound) -> str:
-    side = "below" if bound.factor < 1.0 else "above"
+def _text(bound: Bound, side: str) -> str:
     return f"{bound.how} {side} {bound}" if bound.how else str(bound)

@@ -116,7 +116,7 @@ def fly(vehicle: Vehicle, trial: Trial, law: Mapping[str, Any], assumed: Vehicle
         plan = FlightPlan.of(FlightSpec.of(**options, duration=trial.duration_s))
         if trial.off_m:
             x, y, z = position(plan.track, np.zeros(1))[0]
-            start = {"x": x, "y": y - trial.off_m, "z": z, "rotors": plan.plant_vehicle.hover_rpm}
+            start = {"x": x, "y": y - trial.off_m, "z": z, "rotors": vehicle.hover_rpm}
             plan = FlightPlan.of(FlightSpec.of(**options, duration=trial.duration_s, start=start))
         outcome = fly_to_its_end(plan)
     except Error as error:
@@ -124,11 +124,13 @@ def fly(vehicle: Vehicle, trial: Trial, law: Mapping[str, Any], assumed: Vehicle
     if outcome.report is None or outcome.error is not None:
         return Flown(f"lost: {outcome.lost}", nan, nan)
     report = outcome.report
-    error_m, swing_rad_s = report["rmse_in_window_m"], report["limit_cycle_rad_s"] or 0.0
+    error_m, swing_rad_s, off_m = (
+        report[key] or 0.0 for key in ("rmse_in_window_m", "limit_cycle_rad_s", "max_error_in_window_m")
+    )
     reasons = (
         f"lost: {outcome.lost}" if outcome.lost else "",
         f"lost: {report['ground_hits']} ground hits" if report["ground_hits"] else "",
-        f"lost: {error_m:.1f} m off its track" if error_m > FAR_M else "",
+        f"lost: {off_m:.1f} m off its track" if off_m > FAR_M else "",
         f"swings: {swing_rad_s:.1f} rad/s" if swing_rad_s > LIMIT_CYCLE_RAD_S else "",
     )
     return Flown(next(filter(None, reasons), ""), error_m, swing_rad_s)

@@ -63,13 +63,13 @@ def test_an_empty_battery_has_less_thrust() -> None:
 
 def test_the_figure_has_a_bar_for_each_number() -> None:
     rows = [
-        Tolerance("mass", Bound(0.5, "lost: x"), Bound(1.2, "swings: x")),
+        Tolerance("mass", Bound(1.0, "lost: x"), Bound(1.2, "swings: x")),
         Tolerance("drag", Bound(0.25, ""), Bound(4.0, "")),
     ]
     (axes,) = draw_tolerances("mine", rows).axes
     bars = [bar for bar in axes.patches if isinstance(bar, Rectangle)]
-    assert [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars] == [(0.5, 1.2), (0.25, 4.0)]
-    assert [text.get_text() for text in axes.texts] == ["lost below 0.50", "swings above 1.20", "≤ 0.25", "≥ 4.00"]
+    assert [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars] == [(1.0, 1.2), (0.25, 4.0)]
+    assert [text.get_text() for text in axes.texts] == ["lost below 1.00", "swings above 1.20", "≤ 0.25", "≥ 4.00"]
 
 
 def test_a_vehicle_too_heavy_for_its_rotors_is_bad_input(refused: Refused, tmp_path: Path) -> None:

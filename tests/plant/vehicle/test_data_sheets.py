@@ -9,10 +9,9 @@ import msgspec
 import pytest
 
 from colibri.common.config import read_settings
-from colibri.conformance.vehicle_flights import OFF_M, lemniscate
+from colibri.conformance.vehicle_flights import Trial, fly, lemniscate
 from colibri.plant.vehicle.data_sheets import LAYOUTS, ORDERS, DataSheet, propeller_of, thrust_stand_of, vehicle_file
 from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
-from tools.vehicles import Trial, fly
 
 X500 = DataSheet("mine", 2.0643, 0.25, propeller_of("1045"), kv_rpm_v=920.0, cells=4, hover_throttle=0.6)
 CF21 = DataSheet(
@@ -62,15 +61,15 @@ def test_lag_and_inertia_are_not_below_those_of_the_true_vehicle() -> None:
 def test_a_vehicle_from_data_sheets_flies_the_true_one() -> None:
     true, found = load_vehicle(str(TRUE_CF21)), written(CF21)
     options = {"track": lemniscate(true), "plant_vehicle": true}
-    outcome = fly(true, Trial(lambda _: options, 12.0, OFF_M, lambda _: found))
-    assert not outcome.lost
-    assert outcome.rms_m < 0.1 * CF21.arm_m
+    flown = fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, found)
+    assert not flown.lost
+    assert flown.error_m < 0.1 * CF21.arm_m
 
 
 def test_without_its_drag_a_small_vehicle_still_flies_within_a_quarter_of_its_arm() -> None:
     true, found = load_vehicle(str(TRUE_CF21)), written(CF21._replace(drag_n_s_m=None))
     options = {"track": lemniscate(true), "plant_vehicle": true}
-    assert fly(true, Trial(lambda _: options, 12.0, OFF_M, lambda _: found)).rms_m < 0.25 * CF21.arm_m
+    assert fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, found).error_m < 0.25 * CF21.arm_m
 
 
 def test_a_thrust_stand_wins_over_estimates() -> None:
