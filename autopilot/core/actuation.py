@@ -4,8 +4,7 @@ from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.registry import check_rotor_speeds
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
-from colibri.autopilot.core.defence.descent import Descent
-from colibri.autopilot.core.defence.plain_law import PlainLaw
+from colibri.autopilot.core.defence.plain_law import Descent, PlainLaw
 from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.common.types import PerRotor
 from colibri.plant.vehicle.description import Rotors, Vehicle

@@ -4,7 +4,7 @@ from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.core.defence import table
-from colibri.autopilot.core.defence.descent import Descent
+from colibri.autopilot.core.defence.plain_law import Descent
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.autopilot.guidance.tasks.position import HoldTask

@@ -17,7 +17,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.actuation import Actuation
 from colibri.autopilot.core.defence.errors import Defence
-from colibri.autopilot.core.subscription import FlownSettings, Subscribers
+from colibri.autopilot.core.subscription import Subscribers
 from colibri.autopilot.core.trial import VehicleTrial
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.ground.battery_monitor import BatteryMonitor
@@ -117,7 +117,8 @@ def parts_of(
             *(tasks.adopt, rotor_loss.adopt, actuation.adopt, delay.adopt, snapshots.adopt),
             *(part.adopt for part in leads),
         ),
-        flown=FlownSettings(parameters.values, Tuned(flown, assumed, loop.controller)),
+        values=parameters.values,
+        tuned=Tuned(flown, assumed, loop.controller),
     )
 
     def rebuild(lost: int | None) -> None:

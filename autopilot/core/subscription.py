@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from colibri.autopilot.control.interface import Controller
 from colibri.autopilot.guidance.behaviour import Behaviour
@@ -13,15 +13,11 @@ from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.plant.vehicle.description import Vehicle
 
 
-class FlownSettings(NamedTuple):
-    """The active parameters, control law and vehicle."""
-
-    values: Mapping[str, Value]
-    tuned: Tuned
-
-
 class Subscribers:
-    """Callbacks that adopt a change of parameters; control law and vehicle only if one of their numbers has changed."""
+    """Callbacks that adopt a change of parameters; control law and vehicle only if one of their numbers has changed.
+
+    The active parameters, control law and vehicle are `values` and `tuned`.
+    """
 
     def __init__(
         self,
@@ -30,10 +26,11 @@ class Subscribers:
         behaviour: tuple[Callable[[Behaviour], None], ...],
         law: tuple[Callable[[Controller[Any], Vehicle], None], ...],
         vehicle: tuple[Callable[[Vehicle], None], ...],
-        flown: FlownSettings,
+        values: Mapping[str, Value],
+        tuned: Tuned,
     ) -> None:
         self._parameters, self._behaviour, self._law, self._vehicle = parameters, behaviour, law, vehicle
-        self._flown = flown
+        self._values, self._tuned = values, tuned
         self.revision = 0  # of the adopted parameters
 
     def adopt(self, parameters: Parameters) -> None:
@@ -43,22 +40,22 @@ class Subscribers:
         tuned = made if isinstance(made, Tuned) else None
         for call in self._calls(parameters, tuned):
             call()
-        self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
+        self._values, self._tuned = parameters.values, tuned or self._tuned
 
     def fly(self, tuned: Tuned) -> None:
         """Adopt another control law and vehicle with the same parameters."""
         for call in self._calls_of(tuned):
             call()
-        self._flown = self._flown._replace(tuned=tuned)
+        self._tuned = tuned
 
     def keep(self, parameters: Parameters) -> None:
         """Return to the settings before a change that a subscriber refused."""
-        parameters.load(self._flown.values)
+        parameters.load(self._values)
         parameters.take_made()
         self.revision = parameters.revision
         calls = list[Callable[[], None]]()
         with suppress(Exception):  # what has raised may raise again, and has adopted nothing
-            calls += self._calls(parameters, self._flown.tuned)
+            calls += self._calls(parameters, self._tuned)
         for call in calls:
             with suppress(Exception):
                 call()

@@ -43,7 +43,7 @@ class Supervision:
         """Update the pilot's inputs, and have the pilot execute the failsafe that is due."""
         parts, guard = self._parts, self._guard
         guard(table.ROTOR_WATCH, self._watch_rotors, table.nothing, state)
-        steered, position_known = guard(table.SETPOINTS, self._sensed, _not_steered, now_us)
+        steered, position_known = guard(table.SETPOINTS, self._sensed, lambda: (NOT_STEERED, True), now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
         lift, push, watch = None, 0.0, parts.rotor_loss.watch
@@ -120,7 +120,3 @@ class Supervision:
             exempt=_NOTHING if stations.exempt is None else stations.exempt(),
             caught=self._caught_us is not None,
         )
-
-
-def _not_steered() -> tuple[ClientInputs, bool]:
-    return NOT_STEERED, True

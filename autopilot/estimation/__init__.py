@@ -9,6 +9,6 @@ measurement, so that the covariance is consistent. The current state is integrat
 EKF2 has an output observer instead of this second integration, which is exact and costs microseconds.
 
 A frame passes `sensing`, `delay_buffer`, `eskf_predict`, `eskf_update` (by `measurements`) and `output_smoothing`.
-After each fix, `accelerometer_bias` and `gyroscope_bias` look for sudden biases. `sensing.alignment` and
+After each fix, `accelerometer_bias` and `inertial_watch` look for sudden biases. `sensing.alignment` and
 `sensing.free_fall` start the filter.
 """

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.autopilot.estimation.measurements.barometer import BarometerFusion
-from colibri.autopilot.estimation.measurements.kind import MeasurementKind
+from colibri.autopilot.estimation.measurements.instrument import MeasurementKind
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square

@@ -26,7 +26,7 @@ from colibri.autopilot.estimation.eskf_predict import (
     predict,
 )
 from colibri.autopilot.estimation.estimate import FilterCheck, Tests
-from colibri.autopilot.estimation.measurements.kind import FIVE_SIGMA, KindRecord, MeasurementKind
+from colibri.autopilot.estimation.measurements.instrument import FIVE_SIGMA, KindRecord, MeasurementKind
 from colibri.autopilot.estimation.measurements.table import instruments_of, kinds_of
 from colibri.autopilot.estimation.sensing.alignment import Aligned
 from colibri.autopilot.estimation.sensing.free_fall import Caught

@@ -8,10 +8,8 @@ import numpy as np
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, exp, sin
 from colibri.common.matrices import put
-from colibri.common.types import Array
+from colibri.common.types import Array, Quaternion, Vector
 
-Three: TypeAlias = tuple[float, float, float]
-Four: TypeAlias = tuple[float, float, float, float]
 Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 # First index of each part of the error state: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU.
@@ -21,11 +19,7 @@ NOMINAL = 23  # the nominal state has a quaternion for the attitude: later parts
 
 INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
 SAMPLE = 9  # columns of a sample: duration, s; mean specific force and rate; whether each is unknown or modelled
-ACROSS, ALONG, THRUST = (
-    1,
-    2,
-    3,
-)  # of a modelled force: drag across and along the rotors' axes, over that across in hover
+ACROSS, ALONG, THRUST = 1, 2, 3  # of a modelled force: drag across and along the rotors' axes, over hover's across
 UNKNOWN, MODELLED = 1.0, 2.0  # with velocity or attitude constant; replaced by the model of the rotors
 
 _BLIND_FORCE_DENSITY = 3.0**2  # (m/s²)²/Hz: 3 m/s after a second without an accelerometer
@@ -57,7 +51,7 @@ class Noise(NamedTuple):
 
 
 @compiled
-def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Three, Three]:
+def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Vector, Vector]:
     """Advance the nominal state by one sample, Solà's (260).
 
     Return the rotation at mid-interval by rows, specific force without bias, and the angle turned, rad, FLU.
@@ -212,7 +206,7 @@ def _bound(P: Array, part: int, maximum: float) -> None:
 
 
 @compiled
-def _turned(q: Four, x: float, y: float, z: float) -> Four:
+def _turned(q: Quaternion, x: float, y: float, z: float) -> Quaternion:
     """Return q ⊗ Exp of a body rotation vector, rad."""
     square = 0.25 * (x * x + y * y + z * z)
     if square < _SMALL_TURN * _SMALL_TURN:
@@ -232,7 +226,7 @@ def _turned(q: Four, x: float, y: float, z: float) -> Four:
 
 
 @compiled
-def _matrix(q: Four) -> Nine:
+def _matrix(q: Quaternion) -> Nine:
     w, x, y, z = q
     return (
         1.0 - 2.0 * (y * y + z * z),

@@ -12,12 +12,11 @@ from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
 from colibri.autopilot.estimation.eskf_predict import look_ahead
 from colibri.autopilot.estimation.estimate import Estimate, FilterCheck, Health, Tests
-from colibri.autopilot.estimation.gyroscope_bias import turned_since
-from colibri.autopilot.estimation.inertial_watch import InertialWatch
+from colibri.autopilot.estimation.inertial_watch import InertialWatch, turned_since
 from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Value
 from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
-from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
+from colibri.autopilot.estimation.sensing.free_fall import Falling
 from colibri.autopilot.estimation.sensing.inertial import Expected, Inertial, InertialReading
 from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
@@ -164,7 +163,9 @@ class Estimator:
             if aligned is not None:
                 self._start(aligned, frame.time_us)
             elif caught is not None:
-                self._start_in_air(caught, frame.time_us)
+                self.caught = True
+                (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
+                self.filter.start_in_air(caught, (e + de, n + dn, u + du), frame.time_us)
             else:
                 return
             self._published_us = self.filter_us = frame.time_us
@@ -231,11 +232,6 @@ class Estimator:
         for instrument, value in zip(self.filter.instruments, self._at_rest, strict=True):
             if instrument.smoothed and value is not None:
                 instrument.fuse(self.filter.x, self.filter.P, value, time_us)
-
-    def _start_in_air(self, caught: Caught, time_us: int) -> None:
-        self.caught = True
-        (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
-        self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
 
     def _take_until(self, now_us: int) -> None:
         waiting, before_us = self._buffer.waiting, now_us - self._delay_us

@@ -1,10 +1,14 @@
-"""Failures of inertial sensors that show in their noise, in biases that grow, or against two other sensors."""
+"""Failures of inertial sensors that show in their noise, in biases that grow, or against two other sensors.
 
-from math import copysign, sqrt
+A sudden gyroscope bias makes magnetic field and GPS velocity both contradict the attitude. The field is rejected within
+0.1 s, velocity after 1 s or 2 s. Iron also turns a field, and receivers fail, but both have one common cause. The
+covariance is inflated by the turn, as PX4's EKF2 resets its yaw.
+"""
+
+from math import copysign, hypot, sqrt
 
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, learn_drag, roughness
 from colibri.autopilot.estimation.eskf import Filter
-from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.inertial import Inertial
 
 _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
@@ -13,6 +17,8 @@ _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
 _MEAN_PART, _HIGH_SIGMAS = 0.2, 2.5  # filter gain of the mean innovation of pressures, and what contradicts
 _STEEP = 9.0  # σ² of the vertical part of a contradicted velocity
+_REJECTED_US = 200_000  # required rejection of GPS velocity for a gyroscope bias: three fixes at 10 Hz
+_MAX_TURN_RAD = 0.3  # beyond this the field is implausible
 
 
 class InertialWatch:
@@ -35,19 +41,16 @@ class InertialWatch:
         if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
             inertial.gyroscope.failed = inertial.gyroscope.noisy = True
             inertial.gyroscope.value = buffer.mean_rate()
-        self._note_pressure(filter_.barometer.kind)
+        test, before_us = filter_.barometer.kind.test, self._pressure_us
+        self._pressure_us = test.time_us
+        sigmas = copysign(sqrt(min(test.nis, test.gate)), test.innovation[0]) if test.time_us > before_us else 0.0
+        self._high += _MEAN_PART * (sigmas - self._high)
         velocity = filter_.velocity
         if rate_known and velocity.rejected_us is not None and abs(self._high) > _HIGH_SIGMAS:
             east, north, up = velocity.test.innovation
             steep = up * up * velocity.test.nis > _STEEP * (east * east + north * north + up * up)
             long = now_us - velocity.rejected_us > _BOTH_REJECTED_US
             inertial.accelerometer.failed |= long and steep and up * self._high > 0.0
-
-    def _note_pressure(self, kind: MeasurementKind) -> None:
-        test, before_us = kind.test, self._pressure_us
-        self._pressure_us = test.time_us
-        sigmas = copysign(sqrt(min(test.nis, test.gate)), test.innovation[0]) if test.time_us > before_us else 0.0
-        self._high += _MEAN_PART * (sigmas - self._high)
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""
@@ -60,3 +63,14 @@ class InertialWatch:
         for sensor in (self._inertial.accelerometer, self._inertial.gyroscope):
             sensor.failed = sensor.noisy = False
         self._bias_m_s2 = 0.0
+
+
+def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:
+    """Return the field's angle error, rad, and its duration, s, for a gyroscope fault."""
+    velocity, field = filter_.velocity, filter_.magnetometer.kind
+    if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
+        return None
+    if field.rejected_us is None or field.test.time_us <= field.rejected_us:
+        return None
+    angle_rad = hypot(*field.test.innovation) / filter_.field_gauss
+    return (angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MAX_TURN_RAD else None

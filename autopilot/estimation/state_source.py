@@ -70,22 +70,17 @@ class StateSource:
             return
         self._given = None
         assert self._make is not None, "frames of sensors come only where there is an estimator"
-        if self._estimating is None or self._begins_again(frame):
+        again = self._time_us is not None and (frame.time_us == 0 or frame.time_us < self._time_us - _LATE_US)
+        if self._estimating is None or again:
             self._estimating, self.estimate = self._make(self._interval_us), None
-        self._time_us = frame.time_us
-        self.sensed = frame
+        self._time_us, self.sensed = frame.time_us, frame
         if frame.gps is not None or frame.distance is not None:
-            self._note_latest(frame)
-        self._estimating.receive(frame)
-        self.estimate = self._estimating.last
-
-    def _note_latest(self, frame: SensorFrame) -> None:
-        for row in OWN_MESSAGES:
-            value = getattr(frame, row.field)
-            if value is not None:
-                self.latest[row.field] = value
+            given = {row.field: getattr(frame, row.field) for row in OWN_MESSAGES}
+            self.latest.update({field: value for field, value in given.items() if value is not None})
         if frame.gps is not None:
             self._fix_us = frame.time_us
+        self._estimating.receive(frame)
+        self.estimate = self._estimating.last
 
     def state(self) -> StateFrame | None:
         if self._given is not None:
@@ -123,8 +118,3 @@ class StateSource:
             return True
         fix = self.fix
         return fix is not None and fix.fix_type >= FixType.FIX_3D and now_us < self._fix_us + _NO_FIX_AFTER_US
-
-    def _begins_again(self, frame: SensorFrame) -> bool:
-        if self._time_us is None:
-            return False
-        return frame.time_us == 0 or frame.time_us < self._time_us - _LATE_US

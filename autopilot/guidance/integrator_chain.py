@@ -49,13 +49,8 @@ def packed_limits(limits: Limits) -> Packed:
 
 
 @lru_cache(maxsize=64)
-def at_speed(limits: Limits, speed_m_s: float) -> Limits:
-    return limits._replace(speed_m_s=speed_m_s)
-
-
-@lru_cache(maxsize=64)
-def climbing_at(limits: Limits, climb_m_s: float) -> Limits:
-    return limits._replace(climb_m_s=climb_m_s)
+def limited(limits: Limits, **others: float) -> Limits:
+    return limits._replace(**others)
 
 
 class Axes(NamedTuple):

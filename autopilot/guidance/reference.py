@@ -49,9 +49,7 @@ class Target(NamedTuple):
 
 
 def at_rest(state: VehicleState) -> Reference:
-    motion = np.zeros((4, 3))
-    motion[0] = state.position_enu_m
-    return Reference(motion, np.array([state.euler[2], 0.0]))
+    return moving_with(state._replace(velocity_enu_m_s=(0.0, 0.0, 0.0)))
 
 
 def moving_with(state: VehicleState) -> Reference:

@@ -23,16 +23,11 @@ _CLEAR_M, _CLEAR_INVERTED_M = 0.3, 5.0  # height for detection: ground presses a
 Laws: TypeAlias = tuple[ReducedAttitude, ...]  # one law for the loss of each rotor, (4,); none for more rotors
 
 
-@lru_cache(maxsize=16)
-def _law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
-    return law_without(vehicle, lost, interval_s)
-
-
 @lru_cache(maxsize=4)
 def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
     if vehicle.rotors.count < _FOUR:
         raise ThreeRotorsError("the vehicle has three rotors")
-    return tuple(_law_without(vehicle, lost, interval_s) for lost in range(_FOUR if _lands(vehicle) else 0))
+    return tuple(law_without(vehicle, lost, interval_s) for lost in range(_FOUR if _lands(vehicle) else 0))
 
 
 def _lands(vehicle: Vehicle) -> bool:
@@ -100,7 +95,7 @@ class RotorLoss:
         if self._designed == _FOUR:
             return True
         try:
-            _law_without(vehicle, self._designed, self._interval_s)
+            law_without(vehicle, self._designed, self._interval_s)
             self._designed += 1
         except ThreeRotorsError:
             self._designed = _FOUR

@@ -1,5 +1,6 @@
 """Landing on three rotors: position and height control, and the allocation to the rotors."""
 
+from functools import lru_cache
 from math import hypot, radians
 
 import numpy as np
@@ -88,9 +89,8 @@ class ThreeRotors:
         forces = self._full_n * self._speeds**2
         d, f_o = self.law.command(direction, rate, np.array([forces[b] - forces[a], forces[o]]))
         max_speed = self._battery.max_speed_now(charge_ah, self._speeds)
-        squared = shared(
-            self.law.trio, thrust_n, d, f_o, self._full_n, (square(self._lag.min_speed), square(max_speed))
-        )
+        limits = square(self._lag.min_speed), square(max_speed)
+        squared = shared(self.law.trio, thrust_n, d, f_o, self._full_n, limits)
         commands = lead(self._speeds, squared, self._lag, max_speed)
         minimum = self._lag.min_speed  # all that the rotor has, not the plan's
         commands[squared <= square(minimum) + _AT_LIMIT] = minimum
@@ -120,13 +120,10 @@ class ThreeRotors:
         _limit(wanted, self._tilt_m_s2)
         wanted[2] = _CLIMB_1_S * (self._climb_m_s(state) - velocity[2])
         wanted -= self._wind
-        _limit(wanted, self._max_tilt_m_s2(hypot(error[0], error[1])))
+        tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(hypot(error[0], error[1]) - _FAR_M, 0.0)
+        _limit(wanted, self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG))))
         wanted[2] = min(max(wanted[2], -_LIFT_M_S2), _LIFT_M_S2)
         return wanted
-
-    def _max_tilt_m_s2(self, off_m: float) -> float:
-        tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(off_m - _FAR_M, 0.0)
-        return self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG)))
 
     def _climb_m_s(self, state: VehicleState) -> float:
         if self._elapsed_s < _SETTLE_S:
@@ -142,6 +139,7 @@ class ThreeRotors:
         self.landed = self.landed or knocked or self._held_s >= _STAYS_S
 
 
+@lru_cache(maxsize=16)
 def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
     measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
     follows = rotor_lag(vehicle, interval_s).planned

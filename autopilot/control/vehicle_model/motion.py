@@ -77,7 +77,10 @@ def carry(
         steps = max(1, ceil(durations_s[command] / _STEP_S - _ROUNDING))
         h = durations_s[command] / steps
         target = commands[command]
-        _follow_at_once(x, target, open_voltage_v, packed[0])
+        if packed[0].lag_up_s <= 0.0:
+            top = _top_speed(target, open_voltage_v, packed[0])
+            for i in range(target.size):
+                x[13 + i] = min(target[i], top)
         for _ in range(steps):
             _write_derivative(k1, x, target, disturbance, open_voltage_v, packed[0])
             _write_derivative(k2, x + 0.5 * h * k1, target, disturbance, open_voltage_v, packed[0])
@@ -149,12 +152,3 @@ def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> floa
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
     voltage_v = loaded_voltage_v(open_voltage_v, power_w, model.resistance_ohm)
     return model.top_speed * (voltage_v / model.full_voltage_v)
-
-
-@compiled
-def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: MotionModel) -> None:
-    if model.lag_up_s > 0.0:
-        return
-    top = _top_speed(target, open_voltage_v, model)
-    for i in range(len(model.momentum)):
-        x[13 + i] = min(target[i], top)

@@ -1,4 +1,4 @@
-"""The plain law, which replaces a failed control law: no plan, no solver.
+"""The plain law, which replaces a failed control law, without plan or solver; and by it the descent, the last resort.
 
 Velocity by PI towards a near place; the thrust axis turned the shortest way, yaw only damped. Attitude and mixer are
 those of the LPV-MPC's recovery, valid from any attitude and at any speed.
@@ -29,6 +29,9 @@ _TURN_PART, _RATE_PART, _MAX_RATE_1_S = 0.3, 0.66, 20.0
 """The rate follows in the time of the rotors' lag and a sample, the attitude three times as slowly."""
 _MAX_RATE_RAD_S = 6.0
 _NOWHERE = np.zeros(3)
+_SINK_1_S, _LEAST_M_S, _MOST_M_S = 0.5, 0.7, 2.0  # of the descent: as fast as the height allows
+_HELD_FOR_US = 700_000
+_SLOWER = 0.3  # part of the commanded sink rate
 
 
 class PlainLaw:
@@ -77,6 +80,22 @@ class PlainLaw:
         thrust_n = max(thrust_n * float(direction[2]), 0.0)
         squared = mix_with_priority(thrust_n, moments, self._mixing, self._min_squared, 1.0)
         return Decision(np.sqrt(squared) * self._max_speed, angles_of(along / norm(along), state.euler[2]))
+
+
+class Descent:
+    """Brake, descend, and stop the rotors on the ground at z = `ground_m`, ENU; a `standing` vehicle stays there."""
+
+    def __init__(self, now_us: int, ground_m: float, *, standing: bool) -> None:
+        self._ground_m = ground_m
+        self._sinks_since_us = self._held_since_us = now_us
+        self.landed = standing
+
+    def step(self, law: PlainLaw, now_us: int, state: VehicleState) -> Decision | None:
+        sink_m_s = min(max(_SINK_1_S * (state.position_enu_m[2] - self._ground_m), _LEAST_M_S), _MOST_M_S)
+        if now_us - self._sinks_since_us < _HELD_FOR_US or abs(state.velocity_enu_m_s[2]) > _SLOWER * sink_m_s:
+            self._held_since_us = now_us
+        self.landed = self.landed or now_us - self._held_since_us >= _HELD_FOR_US
+        return None if self.landed else law.by_velocity(state, np.array([0.0, 0.0, -sink_m_s]))
 
 
 def _shortened(vector: Array, longest: float) -> Array:

@@ -25,7 +25,7 @@ class StateEstimates:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
         guard, source = self._defence.guard, self._source
         if not self.blind:
-            worked, known = guard(table.ESTIMATOR, self._estimated, _failed, frame, now)
+            worked, known = guard(table.ESTIMATOR, self._estimated, lambda: (False, None), frame, now)
             if worked:
                 self._inertial, self._missed = None, 0
                 return known
@@ -49,8 +49,7 @@ class StateEstimates:
             self._inertial = InertialEstimate(estimate, self._gravity)
         known = self._inertial.step(frame)
         estimate = estimate._replace(frame=known, check=None)
-        if not self.blind and (self._missed > _BRIDGED or self._defence.counts[table.ESTIMATOR] > _MAX_ERRORS):
-            self.blind = True
+        self.blind |= self._missed > _BRIDGED or self._defence.counts[table.ESTIMATOR] > _MAX_ERRORS
         if self.blind:
             (_, _, height_m), (_, _, climb_m_s) = estimate.position_std_m, estimate.velocity_std_m_s
             health = estimate.health._replace(
@@ -66,7 +65,3 @@ class StateEstimates:
             )
         self._source.estimate = estimate
         return known
-
-
-def _failed() -> tuple[bool, StateFrame | None]:
-    return False, None

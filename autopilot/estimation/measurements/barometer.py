@@ -2,8 +2,7 @@
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
-from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import MeasurementKind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, MeasurementKind, Ratio, Value
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa

@@ -6,8 +6,7 @@ import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import ATTITUDE, GYRO_BIAS, HARD_IRON
-from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import MeasurementKind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, MeasurementKind, Ratio, Value
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.elementary import square

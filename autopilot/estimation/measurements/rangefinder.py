@@ -9,8 +9,7 @@ import numpy as np
 
 from colibri.autopilot.estimation.eskf_predict import ATTITUDE, ERRORS, POSITION
 from colibri.autopilot.estimation.eskf_update import fuse_rows
-from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import MeasurementKind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, MeasurementKind, Ratio, Value
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
 from colibri.common.elementary import square

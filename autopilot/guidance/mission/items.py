@@ -1,6 +1,7 @@
 """Accepted mission items (https://mavlink.io/en/messages/common.html#mav_commands); nan is the default of a value."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from math import inf, isfinite, isnan
 from typing import NamedTuple, TypeAlias
 
@@ -80,7 +81,7 @@ _ALLOWED: Mapping[int, _Allowed] = {
 FLOWN: frozenset[int] = frozenset(_ALLOWED)
 _COPTERS_SKIPPED = (208, 212, 215, 216, 222, 223, 600)
 """Parachute, autotune, repeated way, sprayer, limits of GUIDED, engine, jump tag."""
-_COPTERS: Mapping[int, _Allowed] = {
+_COPTERS: Mapping[int, _Allowed] = {  # as ArduCopter: a place of 0, 0 is where the vehicle is going
     **{command: allowed._replace(here=allowed.place) for command, allowed in _ALLOWED.items()},
     mav.MAV_CMD_NAV_SPLINE_WAYPOINT: _Allowed(True, True, here=True),
     mav.MAV_CMD_NAV_DELAY: _Allowed(p1=isfinite),
@@ -91,11 +92,6 @@ _COPTERS: Mapping[int, _Allowed] = {
     DO_AUX_FUNCTION: _Allowed(p1=_whole(0, 0xFFFF), p2=_one_of(0.0, 1.0, 2.0)),
 }
 COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h
-
-
-def check_copter_item(item: MissionItem) -> int:
-    """Check an item as ArduCopter: a place of 0, 0 is where the vehicle is going."""
-    return check_item(item, _COPTERS, COPTERS_MAX_HEIGHT_M)
 
 
 def check_item(item: MissionItem, table: Mapping[int, _Allowed] = _ALLOWED, max_height_m: float = MAX_HEIGHT_M) -> int:
@@ -179,5 +175,5 @@ def rally_places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geode
 
 
 MISSION_RULES = Rules(check_item, check_mission)
-COPTER_RULES = Rules(check_copter_item, check_mission)
+COPTER_RULES = Rules(partial(check_item, table=_COPTERS, max_height_m=COPTERS_MAX_HEIGHT_M), check_mission)
 RALLY_RULES = Rules(check_rally_item, lambda _: (ACCEPTED, 0))

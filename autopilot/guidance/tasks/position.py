@@ -5,7 +5,7 @@ from math import dist, hypot, inf, pi, radians, remainder, tau
 from typing import TypeAlias
 
 from colibri.autopilot.control.interface import Pace
-from colibri.autopilot.guidance.integrator_chain import at_speed, climbing_at
+from colibri.autopilot.guidance.integrator_chain import limited
 from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
 from colibri.autopilot.guidance.tasks.task import (
@@ -51,7 +51,7 @@ class GoToTask:
     def update(self, context: TaskContext) -> PositionMotion:
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
-            limits = at_speed(limits, min(self._speed_m_s, context.behaviour.max_speed_m_s))
+            limits = limited(limits, speed_m_s=min(self._speed_m_s, context.behaviour.max_speed_m_s))
         return PositionMotion(self._turning(context) if self._turn else self._target, limits, Pace.WAITING)
 
     def _turning(self, context: TaskContext) -> Target:
@@ -116,7 +116,7 @@ class TakeoffTask:
         """Brake horizontally first."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
-            limits = climbing_at(limits, self._speed_m_s)
+            limits = limited(limits, climb_m_s=self._speed_m_s)
         if self._way is None:
             x, y, _ = context.place
             above = (x, y, self._height_m)

@@ -1,4 +1,4 @@
-"""Waypoint files."""
+"""Waypoint files: points, and balls or windows to fly through in their place."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFileError, read_table
-from colibri.autopilot.guidance.trajectories.openings import Openings
 from colibri.common import elementwise
 from colibri.common.types import Array
 
@@ -15,8 +14,39 @@ DEFAULT_SPEED_M_S = 2.0
 MARGIN = 0.1  # part of each range reserved for the control law, also against wind
 MIN_LEG_S = 0.05
 
+_INSIDE = 0.999  # at the edge of an opening itself the slope of a variable vanishes
 _REQUIRED = ("x", "y", "z")
 _OPTIONAL = ("t", "yaw", *(_WINDOW := ("width", "height", "facing")))
+
+
+@dataclass(frozen=True, slots=True)
+class Openings:
+    """What each waypoint is widened to: all that `centres + axes · q` reaches for q in a unit ball, or a unit box."""
+
+    centres_enu_m: Array  # (n, 3)
+    axes_m: Array  # half axes in columns, ENU, (n, 3, 3); 0 where a point is kept
+    together: Array  # 1 for a ball, (3, 3); the identity for a box
+
+    def points(self, u: Array) -> Array:
+        """Return points, ENU, (n, 3), of unbounded variables, (n, 3)."""
+        points: Array = self.centres_enu_m + _applied(self.axes_m, 2.0 * u / self._spread(u))
+        return points
+
+    def variables(self, points: Array) -> Array:
+        """Return the variables, (n, 3), of points inside."""
+        length = np.maximum((self.axes_m * self.axes_m).sum(axis=1), 1e-12)
+        q = _INSIDE * _applied(np.swapaxes(self.axes_m, 1, 2), points - self.centres_enu_m) / length
+        variables: Array = q / (1.0 + np.sqrt(np.maximum(1.0 - _applied(self.together, q * q), 0.0)))
+        return variables
+
+    def slopes(self, u: Array, of_points: Array) -> Array:
+        """Return the slopes with the variables, (n, 3), from those with the points."""
+        spread, pull = self._spread(u), _applied(np.swapaxes(self.axes_m, 1, 2), of_points)
+        slopes: Array = 2.0 * pull / spread - 4.0 * u * _applied(self.together, pull * u / (spread * spread))
+        return slopes
+
+    def _spread(self, u: Array) -> Array:
+        return 1.0 + _applied(self.together, u * u)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +102,9 @@ def read_waypoints(
         raise TrackFileError(f"{path}: line 1: columns {', '.join(_WINDOW)} belong together, without option tolerance")
     if not fastest or (tolerance_m is None and not windows):
         return waypoints
-    return _with_windows(waypoints, table) if tolerance_m is None else _with_balls(waypoints, tolerance_m)
-
-
-def _with_balls(waypoints: Waypoints, radius_m: float) -> Waypoints:
-    axes = np.tile((1.0 - waypoints.margin) * radius_m * np.identity(3), (len(waypoints.points_enu_m), 1, 1))
+    if tolerance_m is None:
+        return _with_windows(waypoints, table)
+    axes = np.tile((1.0 - margin) * tolerance_m * np.identity(3), (len(points), 1, 1))
     return _opened(waypoints, axes, np.ones((3, 3)))
 
 
@@ -117,3 +145,8 @@ def _times(table: CsvTable, points: Array, speed_m_s: float) -> Array:
     times_s = leg_times(points, speed_m_s)
     table.check_duration("x", times_s)
     return times_s
+
+
+def _applied(matrices: Array, vectors: Array) -> Array:
+    applied: Array = (matrices * vectors[:, None]).sum(axis=-1)
+    return applied

@@ -6,7 +6,7 @@ import pytest
 
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.core.subscription import FlownSettings, Subscribers
+from colibri.autopilot.core.subscription import Subscribers
 from colibri.autopilot.parameters.definitions import DESCRIBED, ImpossibleError, Numbers, definitions
 from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.common.config import SettingsError
@@ -104,9 +104,8 @@ def test_subscribers_receive_each_change_once(flight: Flight) -> None:
         behaviour=(lambda flies_by: handed.append(f"cruise {flies_by.limits.speed_m_s:g}"),),
         law=(lambda _, vehicle: handed.append(f"law for {vehicle.body.mass_kg:g} kg"),),
         vehicle=(lambda vehicle: handed.append(f"vehicle of {vehicle.body.mass_kg:g} kg"),),
-        flown=FlownSettings(
-            flight.parameters.values, Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law)
-        ),
+        values=flight.parameters.values,
+        tuned=Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law),
     )
     subscribers.adopt(flight.parameters)
     assert handed == []
@@ -241,8 +240,8 @@ def test_a_change_that_a_subscriber_cannot_adopt_is_taken_back(flight: Flight) -
         adopted.append(vehicle.body.mass_kg)
 
     tuned = Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law)
-    flown = FlownSettings(flight.parameters.values, tuned)
-    subscribers = Subscribers(parameters=(), behaviour=(), law=(), vehicle=(adopt,), flown=flown)
+    values = flight.parameters.values
+    subscribers = Subscribers(parameters=(), behaviour=(), law=(), vehicle=(adopt,), values=values, tuned=tuned)
     assert flight.parameters.set("VEH_MASS", 0.75) is None
     with pytest.raises(ValueError, match="no"):
         subscribers.adopt(flight.parameters)

@@ -9,8 +9,7 @@ import pytest
 
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
 from colibri.autopilot.core.actuation import controls_of
-from colibri.autopilot.core.defence.descent import Descent
-from colibri.autopilot.core.defence.plain_law import PlainLaw
+from colibri.autopilot.core.defence.plain_law import Descent, PlainLaw
 from colibri.common.rotations import tilt_deg
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand

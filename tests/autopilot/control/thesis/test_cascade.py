@@ -1,11 +1,12 @@
-"""Position controller, mixer, and the core that composes them."""
+"""The position loop of the cascade, and the mixer."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.autopilot.control.thesis.position_loop import PositionController, PositionSettings
+from colibri.autopilot.control.interface import AT_REST as STATE
+from colibri.autopilot.control.thesis.cascade import demanded
 from colibri.autopilot.control.vehicle_model.mixer import Mixer
 from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
@@ -23,8 +24,7 @@ AT_REST = (0.0, 0.0, 0.0)
 @given(vectors(3.0), vectors(3.0), reals(10.0))
 def test_the_thrust_gives_the_acceleration_of_the_poles(error: Vector, speed: Vector, yaw: float) -> None:
     """Feedback linearisation: on the nonlinear body the closed loop is e'' = -k1 e - k2 e' on every axis."""
-    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -1.5)), VEHICLE)
-    demand = controller.step(AT_REST, speed, error, AT_REST, yaw)
+    demand = demanded((-1.0, -1.5), VEHICLE, STATE._replace(velocity_enu_m_s=speed), error, AT_REST, yaw)
     attitude = quaternion_from_euler(demand.phi, demand.theta, yaw)
     force_n = np.array(earth_from_body(attitude, (0.0, 0.0, demand.thrust_n))) - [0.0, 0.0, WEIGHT_N]
     wanted = 1.5 * np.array(error) - 2.5 * np.array(speed)
