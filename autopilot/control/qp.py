@@ -209,7 +209,7 @@ def check_solver(name: str) -> None:
 
     if name in qpsolvers.available_solvers:
         return
-    if name not in _known_solvers():
+    if not hasattr(qpsolvers, f"{name}_solve_qp"):
         raise SolverError(unknown("solver", name, installed_solvers()))
     extra = "colibri-sitl[solvers]" if name in IN_SOLVERS_EXTRA else f"qpsolvers[{name}]"
     raise SolverError(f"solver {name} is not installed: pip install '{extra}'")
@@ -237,14 +237,6 @@ def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> tuple[Any, NDA
     sparse = csc_matrix(np.frombuffer(filled, dtype=np.bool_).reshape(shape).astype(np.float64))
     columns = np.repeat(np.arange(shape[1]), np.diff(sparse.indptr))
     return sparse, sparse.indices * shape[1] + columns
-
-
-@cache
-def _known_solvers() -> frozenset[str]:
-    import qpsolvers
-
-    suffix = "_solve_qp"
-    return frozenset(entry.removesuffix(suffix) for entry in dir(qpsolvers) if entry.endswith(suffix))
 
 
 def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:

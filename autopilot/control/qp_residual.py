@@ -12,9 +12,8 @@ def residual(
 ) -> float:
     """Return the largest violation of a constraint, or of stationarity in parts of f; inf if not finite.
 
-    Args:
-        z: Multipliers of G x <= h, (m,), or (0,) if unknown: then only feasibility counts.
-        z_box: Multipliers of the bounds, (n,), negative at a lower bound; or (0,).
+    The multipliers z of G x <= h are (m,), and those of the bounds, z_box, (n,), negative at a lower bound; or (0,) if
+    unknown: then only feasibility counts.
     """
     n, m = G.shape[1], G.shape[0]
     has_multipliers = z.shape[0] == m and z_box.shape[0] >= lower.shape[0]

@@ -172,8 +172,7 @@ def formulas(law: str) -> dict[str, str]:
 def scaled(law: str, table: Mapping[str, Any], vehicle: Vehicle) -> dict[str, Any]:
     """Return the settings of a law, without `scaling`, with the numbers that follow from the vehicle.
 
-    Raises:
-        SettingsError: The vehicle is too heavy for its rotors, or a ratio is missing, unknown or invalid.
+    A SettingsError is raised for a vehicle too heavy for its rotors, and for missing, unknown or invalid ratios.
     """
     given = {key: value for key, value in table.items() if key != "scaling"}
     if law not in LAWS or "scaling" not in table:

@@ -101,13 +101,9 @@ class AccelerometerWatch:
 def find_bias(
     rows: Array, first: int, velocity_variance: float, height_variance: float, gravity: float, found: Array
 ) -> float:
-    """Detect a bias; return its variance along each axis, or 0.
+    """Detect a bias in fixes, (n, 15), from the first rejected one on; return its variance along each axis, or 0.
 
-    Args:
-        rows: Fixes, (n, 15); the height is nan without a new pressure.
-        first: First rejected fix.
-        velocity_variance, height_variance: (m/s)² and m².
-        found: Output: bias, FLU, velocity and position errors, ENU.
+    The height of a fix is nan without a new pressure. Write bias, FLU, velocity and position errors, ENU, to `found`.
     """
     n = len(rows) - first
     for k in range(1, len(rows)):
@@ -131,7 +127,7 @@ def find_bias(
     if rest > (freedom + 5.0 * sqrt(2.0 * freedom)) * velocity_variance:
         return 0.0
     began_s = sqrt(lacks[0, 0] ** 2 + lacks[0, 1] ** 2 + lacks[0, 2] ** 2) / size
-    moved, last = _moved(rows, first, lacks, began_s), first
+    moved, last = _integrated(rows, first, lacks, 0.5 * began_s * lacks[0]), first
     while last >= 0 and rows[last, TIME] > rows[first, TIME] - began_s - _ONSET_S:
         last -= 1
     begin = last
@@ -139,7 +135,7 @@ def find_bias(
         begin -= 1
     if last - begin < _FEWEST_BEFORE - 1:
         return 0.0
-    drifted = _drifted(rows, begin)
+    drifted = _integrated(rows, begin, rows[begin:, VELOCITY : VELOCITY + 3].copy(), np.zeros(3))
     if abs(bias[2]) > _ALONG_PART * size and not _is_seen(rows, first, begin, last, moved, drifted, height_variance):
         return 0.0
     if not _is_felt(rows, first, begin, last, gravity, bias):
@@ -149,19 +145,6 @@ def find_bias(
         rows[-1, POSITION : POSITION + 3] - rows[last, POSITION : POSITION + 3] - (drifted[-1] - drifted[last - begin])
     )
     return velocity_variance / spread
-
-
-@compiled
-def _drifted(rows: Array, begin: int) -> Array:
-    """Integrate the filter's velocity from fix `begin` on, m ENU."""
-    drifted = np.zeros((len(rows) - begin, 3))
-    for k in range(1, len(drifted)):
-        row = begin + k
-        dt = rows[row, TIME] - rows[row - 1, TIME]
-        drifted[k] = drifted[k - 1]
-        for i in range(3):
-            drifted[k, i] += 0.5 * dt * (rows[row - 1, VELOCITY + i] + rows[row, VELOCITY + i])
-    return drifted
 
 
 @compiled
@@ -257,11 +240,11 @@ def _fitted(A: Array, d: Array) -> tuple[Array, float]:
 
 
 @compiled
-def _moved(rows: Array, first: int, lacks: Array, began_s: float) -> Array:
-    """Integrate velocity errors from `began_s` before the first fix, m ENU."""
-    moved = np.empty((len(lacks), 3))
-    moved[0] = 0.5 * began_s * lacks[0]
-    for k in range(1, len(lacks)):
+def _integrated(rows: Array, first: int, velocity: Array, start: Array) -> Array:
+    """Integrate a velocity (n, 3) from `start` at fix `first` on, m ENU."""
+    place = np.empty((len(velocity), 3))
+    place[0] = start
+    for k in range(1, len(velocity)):
         dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
-        moved[k] = moved[k - 1] + 0.5 * dt * (lacks[k - 1] + lacks[k])
-    return moved
+        place[k] = place[k - 1] + 0.5 * dt * (velocity[k - 1] + velocity[k])
+    return place

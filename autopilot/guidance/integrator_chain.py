@@ -65,26 +65,16 @@ class Axes(NamedTuple):
 
 @compiled
 def advance(
-    motion: Array,
-    heading: Array,
-    target: Array,
-    kinds: Integers,
-    target_heading: Array,
-    turns: bool,
+    motion: Array,  # position to jerk now, ENU, (4, 3)
+    heading: Array,  # yaw and rate now, (2,)
+    target: Array,  # position to snap, ENU, (n, 5, 3)
+    kinds: Integers,  # binding derivative of each axis, (3,)
+    target_heading: Array,  # yaw, rate, acceleration, (n, 3)
+    turns: bool,  # whether yaw binds; otherwise its rate
     limits: Packed,
-    dt: float,
+    dt: float,  # between instants, s
 ) -> tuple[Array, Array]:
-    """Return motion, (5, n, 3), and heading, (3, n), from now on; a long `dt` takes several steps.
-
-    Args:
-        motion: Position to jerk now, ENU, (4, 3).
-        heading: Yaw and rate now, (2,).
-        target: Position to snap, ENU, (n, 5, 3).
-        kinds: Binding derivative of each axis, (3,).
-        target_heading: Yaw, rate, acceleration, (n, 3).
-        turns: Whether yaw binds; otherwise its rate.
-        dt: Between instants, s.
-    """
+    """Return motion, (5, n, 3), and heading, (3, n), from now on; a long `dt` takes several steps."""
     count = target.shape[0]
     out, out_heading = np.empty((5, count, 3)), np.empty((3, count))
     steps = ceil(dt / _MAX_STEP_S)

@@ -40,7 +40,7 @@ _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 
 
 class Signature(NamedTuple):
-    """Effect of a vehicle's rotors; forces in N at the largest speed."""
+    """Effect of a vehicle's rotors, and constants of the detector; forces in N at the largest speed."""
 
     full_thrust_n: Array  # of each rotor, (m,)
     effect: Array  # force along z and moments about x, y, z for each N of rotor i in column i, (4, m)
@@ -50,9 +50,11 @@ class Signature(NamedTuple):
     mass_kg: float
     gravity_m_s2: float
     yaw_drag_n_m_s: float  # of the hubs in hover, which hides the yaw of small rotors; 0 for four
+    lag: SampledLag
+    interval_s: float
 
 
-def signature_of(vehicle: Vehicle) -> Signature:
+def signature_of(vehicle: Vehicle, interval_s: float) -> Signature:
     allocation = vehicle.allocation()
     turning = allocation[0] != 0.0
     effect = allocation / np.where(turning, allocation[0], 1.0)
@@ -69,6 +71,8 @@ def signature_of(vehicle: Vehicle) -> Signature:
         vehicle.body.mass_kg,
         vehicle.gravity_m_s2,
         _yaw_drag_n_m_s(vehicle),
+        rotor_lag(vehicle, interval_s),
+        interval_s,
     )
 
 
@@ -77,14 +81,6 @@ def _yaw_drag_n_m_s(vehicle: Vehicle) -> float:
         return 0.0
     x, y, _ = vehicle.arms_m().T
     return vehicle.drag.rotor_coefficient * vehicle.hover_speed * float((x * x + y * y).sum())
-
-
-class DetectorModel(NamedTuple):
-    """Constants of the detector."""
-
-    signature: Signature
-    lag: SampledLag
-    interval_s: float
 
 
 class DetectorState(NamedTuple):
@@ -140,11 +136,10 @@ class RotorWatch:
 
     def adopt(self, vehicle: Vehicle) -> None:
         self._battery, self._airframe = BatteryModel(vehicle), airframe_of(vehicle)
-        lag = rotor_lag(vehicle, self._interval_s)
-        signature = signature_of(vehicle)
+        signature = signature_of(vehicle, self._interval_s)
         inertia = np.array([signature.mass_kg, *signature.inertia])
         self._accelerations = signature.effect * signature.full_thrust_n / inertia[:, None]
-        self._numbers = packed(DetectorModel(signature, lag, self._interval_s))
+        self._numbers = packed(signature)
 
     def begin(self, controls: PerRotor) -> None:
         kept = self._kept
@@ -192,33 +187,28 @@ def _take_in(
 ) -> tuple[int, float]:
     kept, known = memory[0], numbers[0]
     speeds_before, before = kept.speeds.copy(), kept.motion.copy()
-    put(_followed(speeds_before, controls, open_v, known.lag, battery), kept.speeds)
+    max_speed = terminal(open_v, speeds_before, battery)[0] / battery[0].full_voltage_v
+    commands = np.empty_like(speeds_before)
+    for i in range(speeds_before.shape[0]):
+        commands[i] = min(max(controls[i], known.lag.min_speed), max_speed)
+    put(follow(speeds_before, commands, known.lag), kept.speeds)
     R = rotation_matrix(attitude)
     for i in range(3):
         kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
-    residual, expected, thrust_n = _residual(kept, before, speeds_before, known.signature, known.interval_s)
-    _feel_push(kept.push, residual, known.signature.variances)
+    residual, expected, thrust_n = _residual(kept, before, speeds_before, known)
+    _feel_push(kept.push, residual, known.variances)
     if not counts:
         kept.evidence[:] = kept.odds[:] = kept.usual[:] = 0.0
         return 0, 0.0
-    return _add_evidence(kept, residual, expected, thrust_n, known.signature)
-
-
-@compiled
-def _followed(speeds: Array, controls: PerRotor, open_v: float, lag: SampledLag, battery: Packed) -> Array:
-    max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
-    commands = np.empty_like(speeds)
-    for i in range(speeds.shape[0]):
-        commands[i] = min(max(controls[i], lag.min_speed), max_speed)
-    return follow(speeds, commands, lag)
+    return _add_evidence(kept, residual, expected, thrust_n, known)
 
 
 @compiled
 def _residual(
-    memory: DetectorState, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
+    memory: DetectorState, before: Array, speeds_before: Array, rotors: Signature
 ) -> tuple[Array, Array, Array]:
     """Return force and moments beyond those of the rotors, those of the rotors, and the thrust of each."""
-    now, speeds = memory.motion, memory.speeds
+    now, speeds, interval_s = memory.motion, memory.speeds, rotors.interval_s
     rotor_count = len(rotors.momentum)
     thrust_n = np.empty(rotor_count)
     h, h_rate = 0.0, 0.0

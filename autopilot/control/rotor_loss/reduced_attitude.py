@@ -25,6 +25,8 @@ _NO_CONE_RAD_S, _WHOLE_CONE_RAD_S = 5.0, 15.0  # the cone opens between these: a
 _MAX_CONE_RAD = 0.35
 _SCARCE = 0.03  # least weight factor of f_o, where the solution has no thrust to take away
 _TIGHTEST = 1e-3
+# Tolerated deviations, rad, rad/s of p and q, and parts of a quarter of the weight: the cost weighs with their squares.
+_DIRECTION, _RATE, _FORCE_PART = 0.12, 3.0, 0.6
 _BISECTIONS = 50
 _SAME_SAMPLE = 1e-9
 _LEAST_MOMENTUM = 1e-12  # N m s: steady rates have a pole where the gyroscopic moments of body and rotors cancel
@@ -32,14 +34,6 @@ _LEAST_MOMENTUM = 1e-12  # N m s: steady rates have a pole where the gyroscopic 
 
 class ThreeRotorsError(AutopilotError):
     """A vehicle that cannot land on three rotors, with the reason."""
-
-
-class Tolerances(NamedTuple):
-    """Tolerated deviations; the cost weighs with one over their squares."""
-
-    direction: float = 0.12  # rad
-    rate: float = 3.0  # p and q, rad/s
-    force_part: float = 0.6  # in parts of a quarter of the weight
 
 
 class Trio(NamedTuple):
@@ -63,9 +57,7 @@ class SpinSolution(NamedTuple):
 class ReducedAttitude:
     """The law for one vehicle that has lost one rotor."""
 
-    def __init__(
-        self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Tolerances
-    ) -> None:
+    def __init__(self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float) -> None:
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
         a, b, o = (allocation[1:3, rotor] / allocation[0, rotor] for rotor in self.trio[1:4])
@@ -76,7 +68,7 @@ class ReducedAttitude:
         self._momentum = _momentum(vehicle, self.trio, opposite_n)
         rate = self._steady_rate(spin_rad_s * self.trio.sign) * opposite_n
         self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _MAX_CONE_RAD)  # at the final spin
-        self._gains = self._designed(interval_s, follows, weights)
+        self._gains = self._designed(interval_s, follows)
         if not np.isfinite(self._gains).all():
             raise ThreeRotorsError(f"no law turns it without rotor {lost + 1}")
 
@@ -111,7 +103,8 @@ class ReducedAttitude:
         """Return p and q for each N of the opposite rotor, with p' = q' = 0 at spin r."""
         ix, iy, iz = self._inertia
         x, y = self._per_opposite
-        about_x, about_y = (_off_zero(r * (iz - i) + self._momentum) for i in (ix, iy))
+        about = (r * (iz - i) + self._momentum for i in (ix, iy))
+        about_x, about_y = (copysign(max(abs(each), _LEAST_MOMENTUM), each) for each in about)
         return np.array([-y / about_x, x / about_y])
 
     def _gain(self, spin: float) -> Array:
@@ -120,10 +113,10 @@ class ReducedAttitude:
         gain: Array = self._gains[first] + (place - first) * (self._gains[first + 1] - self._gains[first])
         return gain
 
-    def _designed(self, interval_s: float, follows: float, weights: Tolerances) -> Array:
+    def _designed(self, interval_s: float, follows: float) -> Array:
         opened = (_SPINS_RAD_S - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
-        newton = weights.force_part * self._weight_n / 4.0
-        Q = np.diag(1.0 / np.array([weights.direction, weights.direction, weights.rate, weights.rate, inf, inf]) ** 2)
+        newton = _FORCE_PART * self._weight_n / 4.0
+        Q = np.diag(1.0 / np.array([_DIRECTION, _DIRECTION, _RATE, _RATE, inf, inf]) ** 2)
         gains = []
         for spin, part in zip(_SPINS_RAD_S.tolist(), np.clip(opened, _SCARCE, 1.0).tolist(), strict=True):
             sampled = expm(self._model(spin, interval_s, follows) * interval_s)
@@ -191,7 +184,3 @@ def _momentum(vehicle: Vehicle, trio: Trio, opposite_n: float) -> float:
     left = list(trio[1:4])
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     return dot(vehicle.rotor_momentum()[left], _speeds(weight_n, vehicle.allocation()[0, left], opposite_n))
-
-
-def _off_zero(momentum: float) -> float:
-    return copysign(max(abs(momentum), _LEAST_MOMENTUM), momentum)

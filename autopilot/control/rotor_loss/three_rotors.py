@@ -6,7 +6,7 @@ from math import hypot, radians
 import numpy as np
 
 from colibri.autopilot.control.interface import Decision, Diagnostics, Fallback, VehicleState
-from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, Tolerances, Trio
+from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, Trio
 from colibri.autopilot.control.vehicle_model import disturbance_observer
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.rotor_lag import follow, lead, rotor_lag
@@ -57,7 +57,9 @@ class ThreeRotors:
         self._speeds[law.trio.lost] = 0.0
         self._tilt_m_s2 = self._gravity * tan(radians(_TILT_DEG))
         self._ground_m = ground_m
-        self._place = stopping_place(state, 0.5 * self._tilt_m_s2)
+        (x, y, z), (vx, vy, _) = state.position_enu_m, state.velocity_enu_m_s
+        stops_s = hypot(vx, vy) / self._tilt_m_s2  # braked by half of the tilt
+        self._place = np.array([x + vx * stops_s, y + vy * stops_s, z])
         self._gains = disturbance_observer.gains(_WIND_RAD_S, interval_s)
         self._velocity, self._wind = np.array(state.velocity_enu_m_s), np.zeros(3)
         self._explained = np.zeros(3)
@@ -143,7 +145,7 @@ class ThreeRotors:
 def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
     measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
     follows = rotor_lag(vehicle, interval_s).planned
-    return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Tolerances())
+    return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured))
 
 
 def shared(
@@ -163,13 +165,6 @@ def shared(
     forces[trio.a], forces[trio.b], forces[trio.o] = 0.5 * (pair_n - d), 0.5 * (pair_n + d), f_o
     squared: Array = forces / full_n
     return squared
-
-
-def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
-    x, y, z = state.position_enu_m
-    vx, vy, _ = state.velocity_enu_m_s
-    time_s = hypot(vx, vy) / (2.0 * braking_m_s2)
-    return np.array([x + vx * time_s, y + vy * time_s, z])
 
 
 def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:

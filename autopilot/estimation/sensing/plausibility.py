@@ -78,11 +78,6 @@ def _reason(values: tuple[float, ...]) -> Reason:
     return Reason.RANGE if all(map(isfinite, values)) else Reason.NOT_FINITE
 
 
-def _possible(latitude_deg: float, longitude_deg: float, altitude_m: float, ve: float, vn: float, vu: float) -> bool:
-    return (
-        is_on_earth(latitude_deg, longitude_deg)
-        and _MIN_HEIGHT_M <= altitude_m <= _MAX_HEIGHT_M
-        and -_MAX_SPEED_M_S <= ve <= _MAX_SPEED_M_S
-        and -_MAX_SPEED_M_S <= vn <= _MAX_SPEED_M_S
-        and -_MAX_SPEED_M_S <= vu <= _MAX_SPEED_M_S
-    )
+def _possible(latitude_deg: float, longitude_deg: float, altitude_m: float, *velocity_m_s: float) -> bool:
+    somewhere = is_on_earth(latitude_deg, longitude_deg) and _MIN_HEIGHT_M <= altitude_m <= _MAX_HEIGHT_M
+    return somewhere and all(abs(speed) <= _MAX_SPEED_M_S for speed in velocity_m_s)

@@ -27,13 +27,8 @@ def load_track(
 ) -> LoadedTrack:
     """Load a track for a vehicle; waypoint tracks are adapted to its limits, others are flown unchanged.
 
-    Args:
-        given: `NAME[:KEY=VALUE[,KEY=VALUE…]]`, or samples.
-        floor_m: Lowest height, m, ENU; by default the ground.
-        text: Content of the track's file, instead of reading it.
-
-    Raises:
-        TrackError: The track is unknown, infeasible, or below the floor.
+    A TrackError is raised if it is unknown, infeasible, or below the floor, m, ENU, by default the ground. `text`
+    replaces the content of the track's file.
     """
     name = str(given)
     found = track(name, given.text if isinstance(given, Trajectory) else text)

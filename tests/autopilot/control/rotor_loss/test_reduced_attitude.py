@@ -13,7 +13,6 @@ from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.rotor_loss.reduced_attitude import (
     ReducedAttitude,
     ThreeRotorsError,
-    Tolerances,
     balancing_thrust,
     trio_without,
 )
@@ -31,7 +30,7 @@ HOVER = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.
 
 
 def law(lost: int, vehicle: str = "hummingbird") -> ReducedAttitude:
-    return ReducedAttitude(load_vehicle(vehicle), lost, INTERVAL_S, FOLLOWS, SPIN_RAD_S, Tolerances())
+    return ReducedAttitude(load_vehicle(vehicle), lost, INTERVAL_S, FOLLOWS, SPIN_RAD_S)
 
 
 @pytest.mark.parametrize("vehicle", ["hummingbird", "iris"])
