@@ -25,8 +25,6 @@ _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 60.0, 60.0, 60.0])  # m/s², rad/s²
 
 
 class DelayCompensation:
-    """Compensates the delay of one vehicle's commands."""
-
     def __init__(self, vehicle: Vehicle, declared_s: float | None = None) -> None:
         """Compensate the declared delay, or with None the measured one."""
         self._measured: deque[int] = deque(maxlen=_MEDIAN_OF)

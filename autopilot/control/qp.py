@@ -51,8 +51,6 @@ class Qp(NamedTuple):
 
 
 class QpResult(NamedTuple):
-    """The result of a QP."""
-
     status: QpStatus
     x: Array | None  # the solution, (n,)
     iterations: float = nan  # nan if the solver gives no count

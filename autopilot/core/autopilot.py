@@ -25,8 +25,6 @@ Ts = TypeVarTuple("Ts")
 
 
 class ControlSample(NamedTuple):
-    """A control sample."""
-
     now_us: int  # time of its frame
     state: VehicleState
     guidance: Guidance

@@ -14,8 +14,6 @@ _CRITICAL = (mav.MAV_BATTERY_CHARGE_STATE_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE
 
 
 class Reporter:
-    """Reports the control samples of one vehicle."""
-
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
         self._health = HealthWatch()

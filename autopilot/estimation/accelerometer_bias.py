@@ -53,8 +53,6 @@ class DetectedBias(NamedTuple):
 
 
 class AccelerometerWatch:
-    """Checks every fix after its test."""
-
     def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
         self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _MIN_SIGMA))
         self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _MIN_SIGMA))

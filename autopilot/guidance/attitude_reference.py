@@ -61,8 +61,6 @@ class ReferenceMemory(NamedTuple):
 
 
 class AttitudeReference:
-    """Generator of attitude demands for one vehicle."""
-
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
         self.adopt(vehicle)
         self._interval_s = preview.interval_us * 1e-6

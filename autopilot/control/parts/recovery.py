@@ -28,8 +28,6 @@ class RecoverySettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class TurnGains(NamedTuple):
-    """Gains of the turn."""
-
     angle: float  # rad/s for each rad
     rate: float  # 1/s
     max_rate_rad_s: float

@@ -28,8 +28,6 @@ _NOTHING = np.empty(0)
 
 
 class Tracked(NamedTuple):
-    """State of the tracker."""
-
     speeds: Array  # of the rotors, parts of the largest, (m,)
     wrench: Array  # now: U1, N, and U2..U4, N m, (4,)
     mean_wrench: Array  # over the interval that ends now, (4,)
@@ -52,8 +50,6 @@ class Observed(NamedTuple):
 
 
 class VehicleTracker:
-    """Tracks one vehicle."""
-
     def __init__(self, vehicle: Vehicle, observer: ObserverSettings, mass: MassSettings, interval_s: float) -> None:
         self.vehicle = vehicle
         self.lag = rotor_lag.rotor_lag(vehicle, interval_s)

@@ -84,8 +84,6 @@ def _yaw_drag_n_m_s(vehicle: Vehicle) -> float:
 
 
 class DetectorState(NamedTuple):
-    """State of the detector."""
-
     speeds: Array  # of the rotors, parts of the largest, (m,)
     motion: Array  # velocity, m/s, ENU; rates, rad/s, FLU; body z axis, ENU: (9,)
     evidence: Array  # CUSUM of each rotor, (m,)
@@ -97,8 +95,6 @@ class DetectorState(NamedTuple):
 
 
 class RotorWatch:
-    """Watches the rotors of one vehicle."""
-
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         self._interval_s = interval_s
         self.lost: int | None = None  # index, permanently

@@ -52,16 +52,12 @@ class CascadeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class AttitudeAndThrust(NamedTuple):
-    """Demand of the outer loop."""
-
     phi: float  # rad
     theta: float  # rad
     thrust_n: float  # U1
 
 
 class CascadeMemory(NamedTuple):
-    """State of the cascade between two control samples."""
-
     rotor_speeds: Array  # last commanded, in the vehicle's unit, (N,)
     demand: AttitudeAndThrust | None  # of the present outer sample
 

@@ -68,8 +68,6 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
 
 
 class Solution(NamedTuple):
-    """A solution of the MPC."""
-
     increment: Array  # the first, (m,); zero if the QP was not solved
     diagnostics: Diagnostics  # `predicted` holds the outputs over the horizon, (N, p)
 

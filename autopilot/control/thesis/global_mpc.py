@@ -46,8 +46,6 @@ class GlobalSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class GlobalMemory(NamedTuple):
-    """State of the MPC between two control samples."""
-
     wrench: Array  # last U1 (N), U2..U4 (N m) decided, (4,); unbounded as in the thesis, so U1 may be negative
     rotor_speeds: Array  # last commanded, in the vehicle's unit, (N,)
 

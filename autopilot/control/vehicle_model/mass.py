@@ -31,8 +31,6 @@ class MassSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class MassModel(NamedTuple):
-    """Constants of the mass estimate."""
-
     nominal_kg: float
     least_thrust_n: float
     rate_1_s: float  # 0: the nominal mass is kept

@@ -22,8 +22,6 @@ _YAW_PART = 0.02
 
 
 class Mixing(NamedTuple):
-    """The allocation of m rotors."""
-
     allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, m)
     inverse: Array  # (m, 4)
 

@@ -26,8 +26,6 @@ class SampledLag(NamedTuple):
 
 
 class RotorModel(NamedTuple):
-    """The rotors of a vehicle."""
-
     lag: SampledLag
     allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, m)
 

@@ -34,8 +34,6 @@ class ErrorRecord(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Defence:
-    """Catches the exceptions of one vehicle."""
-
     def __init__(self, pilot: Pilot, say: Callable[[int, str], None], *, strict: bool) -> None:
         self._pilot, self._say, self._strict = pilot, say, strict
         self._checkpoint: Callable[[], object] | None = None

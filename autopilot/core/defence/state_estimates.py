@@ -13,8 +13,6 @@ _UNKNOWN_M = 1e3
 
 
 class StateEstimates:
-    """The states of one vehicle."""
-
     def __init__(self, source: StateSource, defence: Defence, gravity_m_s2: float) -> None:
         self._source, self._defence, self._gravity = source, defence, gravity_m_s2
         self._inertial: InertialEstimate | None = None

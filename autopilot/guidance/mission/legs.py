@@ -41,8 +41,6 @@ class Defaults(NamedTuple):
 
 
 class ItemContext(NamedTuple):
-    """State of the mission at the start of an item."""
-
     mission_context: MissionContext
     defaults: Defaults
     order: Order

@@ -25,8 +25,6 @@ _ALONG_BEYOND_M, _ALONG_ABOVE_M_S = 2.0, 0.5  # shorter ways and lower speeds ke
 
 
 class GuidedSettings(NamedTuple):
-    """Settings of GUIDED."""
-
     lapse_us: int  # time after which all but positions lapse (GUID_TIMEOUT)
     looks_ahead: bool  # whether the vehicle looks along its way (WP_YAW_BEHAVIOR)
     by_thrust: bool  # whether an attitude has a thrust, not a climb rate (GUID_OPTIONS)

@@ -23,8 +23,6 @@ NOT_STEERED = ClientInputs()
 
 
 class TaskContext(NamedTuple):
-    """Inputs of a task."""
-
     now_us: int  # path time at which commands take effect
     state: VehicleState
     reference: Reference
