@@ -75,7 +75,7 @@ class Commands:
         }
 
     def select(self, mode: Mode) -> Refusal | None:
-        return self.modes.command(mode)
+        return self.modes.select(self.modes.book.chosen[mode])
 
     def _select_here(self, mode: Mode, command: ReceivedCommand) -> Refusal | None:
         refusal = self.select(mode)
@@ -112,7 +112,7 @@ class Commands:
             return denied("mission", f"last item {last:g} is not {total - 1}, its end")
         refusal = self.select(Mode.MISSION)
         if refusal is None and first >= 0.0:
-            self._missions.set_current(int(first), False)
+            self._missions.executor.set_current(int(first), False)
         return refusal
 
     def _pause_or_go_on(self, command: ReceivedCommand) -> Refusal | None:

@@ -41,7 +41,3 @@ class Home:
         """Return a warning of a height along the ground, or an empty text."""
         above_m = height_m - min(0.0, self.position_enu_m[2])
         return f"{above_m:.1f} m above home is along the ground" if above_m < _UNCERTAIN_M else ""
-
-    def move_origin(self, place: Geodetic) -> None:
-        """Set the origin; ENU coordinates keep their values."""
-        self.origin = place

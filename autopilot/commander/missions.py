@@ -27,7 +27,6 @@ from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext, TaskO
 from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, StoredPlan
-from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import MAX_HEIGHT_M, far, too_far
@@ -56,7 +55,7 @@ class Missions:
         self._fence = fence
         self._lines = lines
         self._behaviour = behaviour
-        self._executor = MissionExecutor()
+        self.executor = MissionExecutor()
         self.unmet: dict[Need, str] = {}
         self._remarks: tuple[str, ...] = ()
         self._rally: Sequence[MissionItem] = ()
@@ -70,7 +69,7 @@ class Missions:
 
     @property
     def total(self) -> int:
-        return len(self._executor.items)
+        return len(self.executor.items)
 
     def adopt(self, behaviour: Behaviour) -> None:
         self._behaviour = behaviour
@@ -80,14 +79,11 @@ class Missions:
     def _max_height_m(self) -> float:
         return COPTERS_MAX_HEIGHT_M if self._behaviour.copter_items else MAX_HEIGHT_M
 
-    def progress(self) -> MissionProgress:
-        return self._executor.progress
-
     def load(self, plan_type: int, plan: StoredPlan) -> None:
         self.changes += 1
         items: Sequence[MissionItem] = plan.items
         if plan_type == MISSION:
-            self._executor.load(items)
+            self.executor.load(items)
             self._lines.say(INFO, f"mission of {len(items)} items" if items else "mission cleared")
         elif plan_type == FENCE:
             self._lines.say(INFO, "geofence loaded" if items else "geofence cleared")
@@ -100,13 +96,10 @@ class Missions:
                     self._lines.say(WARNING, f"rally point {seq} is not flown to: {fault}")
         self._check_mission()
 
-    def set_current(self, seq: int, reset: bool) -> Refusal | None:
-        return self._executor.set_current(seq, reset)
-
     def move_origin(self, place: Geodetic) -> None:
         """Move the origin, vehicle and home; plans stay where they are on earth."""
         moved_m = hypot(*enu_of(place, self._home.origin)[:2])
-        self._home.move_origin(place)
+        self._home.origin = place
         if moved_m > _MOVED_M and (self.total or self._rally or self._fence.loaded):
             self._lines.say(WARNING, f"origin moved by {moved_m:.0f} m: the plans stay where they are")
         self.moved_origin()
@@ -134,35 +127,32 @@ class Missions:
         return homeward(context, nearest)
 
     def task(self) -> "MissionTask":
-        self._executor.start()
+        self.executor.start()
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
         """Continue a mission, with the current item's turns and remaining legs."""
         behaviour = self._behaviour
         acceptance_m = max(behaviour.acceptance_m, 0.1)
-        self._executor.defaults = Defaults(
+        self.executor.defaults = Defaults(
             acceptance_m,
             behaviour.takeoff_height_m,
             behaviour.orbit_radius_m,
             behaviour.items_face,
             behaviour.copter_items,
         )
-        return MissionTask(self._executor, self, turns, legs)
-
-    def record(self) -> MissionRecord:
-        return self._executor.record()
+        return MissionTask(self.executor, self, turns, legs)
 
     def resume(self, plans: Mapping[int, StoredPlan], record: MissionRecord | None) -> None:
         self._fence.load(plans[FENCE].items)
-        self._executor.load(plans[MISSION].items)
+        self.executor.load(plans[MISSION].items)
         self._rally = plans[RALLY].items
         if record is not None:
-            self._executor.resume(record)
+            self.executor.resume(record)
 
     def watch_mode(self, mode: Mode) -> None:
-        if self._executor.active and mode is not Mode.MISSION:
-            for event in self._executor.pause(item_flown=mode is Mode.RETURN):
+        if self.executor.active and mode is not Mode.MISSION:
+            for event in self.executor.pause(item_flown=mode is Mode.RETURN):
                 if isinstance(event, Reached):
                     self._reached.append(event.seq)
 
@@ -200,8 +190,6 @@ class Missions:
 
     def check_on(self) -> None:
         """Check more items, at most `CHECKED_AT_ONCE` pairs of a place and an edge."""
-        if not self.checking:
-            return
         at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
         part = self._found[self._checked : self._checked + at_once]
         refused = self._fence.first_outside([place for _, place in part]) if part else None
@@ -212,7 +200,7 @@ class Missions:
 
     def _check_mission(self) -> None:
         """Begin to check the items; legs between them are not checked."""
-        items, home = self._executor.items, self._home
+        items, home = self.executor.items, self._home
         self._fence.budget.spend(_PLACE_US * len(items))
         self._found = list(places(items, home.position_enu_m, home.origin))
         self._checked, self.checking = 0, True
@@ -220,7 +208,7 @@ class Missions:
 
     def _judge(self, outside: str) -> None:
         """Report bad items; `outside` names one outside the fence."""
-        home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
+        home, items, said = self._home, self.executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
         without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if self._behaviour.copter_items else _ON_THE_GROUND
         flown = [each for each in found if items[each[0]].command not in without]
@@ -258,9 +246,7 @@ def _of_item(seq: int, reason: str) -> str:
 class MissionTask:
     """Flies the executor's orders; `returns` if the mission ends with mode return."""
 
-    def __init__(
-        self, executor: MissionExecutor, missions: Missions, turns: float = 0.0, legs: tuple[int, ...] = ()
-    ) -> None:
+    def __init__(self, executor: MissionExecutor, missions: Missions, turns: float, legs: tuple[int, ...]) -> None:
         self._executor = executor
         self._missions = missions
         self._order: Order | None = None

@@ -84,10 +84,6 @@ class ModeSelection:
         self.update()
         return None
 
-    def command(self, mode: Mode) -> Refusal | None:
-        """Select the mode of a command such as NAV_LAND."""
-        return self.select(self.book.chosen[mode])
-
     def fly(self, mode: Mode) -> Refusal | None:
         refusal = self._pilot.select(mode, self._needs.missing())
         remark = "" if refusal else self._needs.remark(mode)

@@ -86,7 +86,7 @@ class ModeTasks:
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._preview, self._instants = preview, instants
         self._references = references
-        self._first, self._budget = first, budget
+        self.first, self._budget = first, budget
         self._factories: dict[Mode, TaskFactory] = {
             Mode.HOLD: lambda _: HoldTask(),
             Mode.TAKEOFF: climb,
@@ -103,15 +103,8 @@ class ModeTasks:
         }
 
     @property
-    def is_first(self) -> bool:
-        return self._first is not None
-
-    @property
     def first_yaw_rad(self) -> float:
-        return start_yaw(self._first, self._references) if self._first else 0.0
-
-    def forget_first(self) -> None:
-        self._first = None
+        return start_yaw(self.first, self._references) if self.first else 0.0
 
     def adopt(self, vehicle: Vehicle) -> None:
         self._gravity_m_s2 = vehicle.gravity_m_s2
@@ -123,12 +116,15 @@ class ModeTasks:
         return GuidedTask(self._attitude, self._gravity_m_s2, settings)
 
     def again(self, record: TaskRecord, mode: Mode, context: TaskContext) -> FlightTask:
-        if mode is Mode.TRACK and self._first is None and record.began_us is not None:
+        if mode is Mode.TRACK and self.first is None and record.began_us is not None:
             chosen = track(context.behaviour.track)
             return TrackTask(self._plan(chosen), chosen.duration_s, record.began_us)
         if mode is Mode.MISSION:
             return self._missions.task_again(record.turns, record.legs)
-        task = _ordered(mode, record, context) or self.begin(mode, context)
+        order = None if record.order is None else order_of(record.order)
+        if order is not None and isinstance(order, _AGAIN.get(mode, ())):
+            return task_of(order, context, context.behaviour.takeoff_speed_m_s)
+        task = self.begin(mode, context)
         return task.skip(record.legs) if isinstance(task, TaskSequence) else task
 
     def _down(self, context: TaskContext) -> FlightTask:
@@ -137,8 +133,8 @@ class ModeTasks:
         return landing(Land())
 
     def _on_track(self, context: TaskContext) -> FlightTask:
-        if self._first is not None:
-            first, self._first = self._first, None
+        if self.first is not None:
+            first, self.first = self.first, None
             planner = self._plan(first)
             for_law = None if self._instants.rows is None else Planner(first, self._references, self._preview)
             return TrackTask(planner, first.duration_s, 0, for_law, start=_at_start(planner, context.now_us))
@@ -153,13 +149,6 @@ class ModeTasks:
 def climb(context: TaskContext) -> FlightTask:
     behaviour = context.behaviour
     return TakeoffTask(context.ground_m + behaviour.takeoff_height_m, None, context, behaviour.takeoff_speed_m_s)
-
-
-def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask | None:
-    order = None if record.order is None else order_of(record.order)
-    if order is None or not isinstance(order, _AGAIN.get(mode, ())):
-        return None
-    return task_of(order, context, context.behaviour.takeoff_speed_m_s)
 
 
 def _at_start(planner: Planner, now_us: int) -> Reference:

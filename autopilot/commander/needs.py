@@ -73,9 +73,6 @@ class ModeNeeds:
         unmet = {need: refused.get(need) or need.value for need, there in met.items() if not there}
         return unmet | self._missions.unmet
 
-    def refusals(self) -> list[str]:
-        return self._pilot.readiness.refusals()
-
     def remark(self, mode: Mode) -> str:
         """Return what a mode waits for, or an empty text."""
         if mode is not Mode.FOLLOW or self.steered(self._now_us).followed is not None:

@@ -27,9 +27,6 @@ class Supervisor:
     def adopt(self, parameters: Parameters) -> None:
         self.limits, self._settings = limits(parameters), settings(parameters)
 
-    def resume(self, memory: FailsafeMemory) -> None:
-        self.memory = memory
-
     def position_known(self, estimate: Estimate | None) -> bool:
         return position_known(estimate, self.limits)
 

@@ -79,7 +79,7 @@ class Checkpointer:
             time_us,
             pilot.home.origin,
             parts.stations.plans.ids,
-            parts.stations.missions.record(),
+            parts.stations.missions.executor.record(),
             pilot.record(),
             task_record(pilot.task),
             parts.loop.record(),
@@ -89,7 +89,7 @@ class Checkpointer:
             parts.rotor_loss.lost,
             parts.rotor_loss.watch.speeds,
             parts.supervisor.memory,
-            parts.stations.station_us is not None,
+            parts.stations.heartbeat.station_us is not None,
         )
 
     def resume(self, history: History, frame: StateFrame, again: Again) -> None:
@@ -99,12 +99,12 @@ class Checkpointer:
         seamless = checkpoint.fingerprint == self._fingerprint and checkpoint.is_followed_by(frame.time_us, CLOSE_US)
         parts.loop.resume(checkpoint.loop, seamless=seamless)
         parts.battery.resume(checkpoint.charge_ah, checkpoint.energy_wh)
-        pilot.home.move_origin(checkpoint.origin)
+        pilot.home.origin = checkpoint.origin
         stations.plans.restore(plans)
         same = stations.plans.ids == checkpoint.plan_ids
         stations.missions.resume(stations.plans.plans, checkpoint.mission if same else None)
         if checkpoint.had_station:
-            stations.expect_station(frame.time_us)
+            stations.heartbeat.station_us = frame.time_us  # lost from now on
         state = parts.loop.observe(frame)
         pilot.resume(
             frame.time_us,
@@ -115,7 +115,7 @@ class Checkpointer:
         )
         stations.missions.moved_origin()
         if pilot.state.armed:
-            parts.supervisor.resume(checkpoint.failsafes)
+            parts.supervisor.memory = checkpoint.failsafes
         lost, ground = checkpoint.rotor_lost, pilot.ground
         if lost is not None:
             flying = pilot.state.armed and not ground.standing

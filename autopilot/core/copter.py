@@ -209,4 +209,4 @@ class Copter:
         self.stations.refuse_commands("Not ready: no attitude and position estimate yet")
         self._receive_from_stations(inbox, self.waiting_us)
         self.stations.refuse_commands("")
-        return self.stations.take_outbox()
+        return self.stations.hub.take_outbox()

@@ -48,7 +48,7 @@ class FlightStart:
     def _resume(self, history: History, frame: StateFrame) -> None:
         parts, pilot, checkpoint = self._parts, self._parts.pilot, history.checkpoint
         if checkpoint.pilot.state.mode is not Mode.TRACK or checkpoint.task.began_us != 0:
-            parts.tasks.forget_first()
+            parts.tasks.first = None
         self._supervision.listen(frame.time_us)
         self._checkpointer.resume(history, frame, parts.tasks.again)
         turns, stopped = pilot.state.armed and not pilot.ground.idles, parts.loop.vehicle.rotors.stopped
@@ -57,7 +57,7 @@ class FlightStart:
         if not pilot.state.armed:
             return
         self._catch(frame.time_us)
-        mode, seq = pilot.state.mode, parts.stations.missions.progress().seq
+        mode, seq = pilot.state.mode, parts.stations.missions.executor.progress.seq
         what = f"mission continues at item {seq}" if mode is Mode.MISSION else f"{mode} continues"
         self.resumed = f"Restarted in flight: {what}"
         parts.lines.say(WARNING, self.resumed)
@@ -68,7 +68,7 @@ class FlightStart:
             parts.stations.system.reboot()
         speed = self._start_speed if frame.time_us == 0 else loop.vehicle.hover_speed
         loop.begin(loop.vehicle.rotors.idle_speed if rests else speed, parts.tasks.first_yaw_rad)
-        mode = Mode.TRACK if parts.tasks.is_first else None
+        mode = None if parts.tasks.first is None else Mode.TRACK
         delay_us = parts.delay.delay_us
         parts.pilot.begin(frame.time_us, loop.observe(frame), mode=mode, rests=rests, delay_us=delay_us)
         parts.rotor_loss.forget()

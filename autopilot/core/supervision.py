@@ -109,7 +109,7 @@ class Supervision:
             setpoint=stations.offboard.latest(now_us, _EVER_US),
             sticks_us=None if sticks is None else sticks.time_us,
             listening_us=self._listening_us,
-            station_us=stations.station_us,
+            station_us=stations.heartbeat.station_us,
             battery=parts.battery.state(),
             fence=None if fence is None else fence.margin_m,
             decided=None if decision is None else decision.diagnostics,

@@ -7,7 +7,6 @@ from typing import Protocol, TypeAlias
 from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import ModeSelection
-from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.autopilot.ground.fault_injection import Failures
@@ -33,7 +32,6 @@ class Served(Protocol):
     modes: ModeSelection
     system: SystemCommands
     parameters: Parameters
-    needs: ModeNeeds
     streams: StreamService
     failures: Failures
     pilot: Pilot

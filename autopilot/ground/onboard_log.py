@@ -46,16 +46,12 @@ class _Topics(TopicLog):
         self._write(encoded)
 
 
-def _ulog(vehicle: LoggedVehicle, write: Write) -> FlightRecorder:
-    return Recorder(_Topics(write), vehicle.name, vehicle.system_id, vehicle.parameters, with_battery=True)
-
-
-def _dataflash(vehicle: LoggedVehicle, write: Write) -> FlightRecorder:
-    return DataFlashRecorder(write, vehicle.parameters, vehicle.banner, vehicle.boot_unix_us)
-
-
-ULOG = LogFormat(ULOG_NAMES, 0, _ulog)
-DATAFLASH = LogFormat(LogNames(".BIN", 8), 1, _dataflash)
+ULOG = LogFormat(
+    ULOG_NAMES, 0, lambda it, write: Recorder(_Topics(write), it.name, it.system_id, it.parameters, with_battery=True)
+)
+DATAFLASH = LogFormat(
+    LogNames(".BIN", 8), 1, lambda it, write: DataFlashRecorder(write, it.parameters, it.banner, it.boot_unix_us)
+)
 
 
 class OnboardLog:

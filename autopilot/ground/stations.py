@@ -134,14 +134,15 @@ class Stations:
         self.modes, self.offboard.taken = commands.modes, commands.taken
         self.exempt, self.takeoff_by_stick = commands.exempt, commands.motion.takeoff_by_stick
         rules = {MISSION: conventions.mission_rules, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
-        vehicle = MissionVehicle(self._load, missions.progress, missions.set_current, commands.motion.guided_goto)
+        executor, guided_goto = missions.executor, commands.motion.guided_goto
+        vehicle = MissionVehicle(self._load, lambda: executor.progress, executor.set_current, guided_goto)
         if wire.home_first:
             missions.boot_unix_us = settings.boot_unix_us
             vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
         self.plans = MissionService(
             rules, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
         )
-        self._heartbeat = HeartbeatService(wire)
+        self.heartbeat = HeartbeatService(wire)
         encoders = streams.chosen(telemetry(settings.boot_unix_us))
         if not wire.streams_current:
             encoders["MISSION_CURRENT"] = lambda _: self.plans.current()
@@ -158,7 +159,7 @@ class Stations:
         setters = Setters(self.system.set_origin, commands.move_home, commands.set_custom_mode)
         further = conventions.services(self)
         services: tuple[Service, ...] = (
-            self._heartbeat,
+            self.heartbeat,
             self._obeys,
             self.streams,
             TimeService(),
@@ -192,22 +193,11 @@ class Stations:
         self.missions.load(plan_type, plan)
         self._conventions.loaded(self.parameters, plan_type, len(plan.items))
 
-    def use(self, channel: int, kind: str) -> None:
-        self.streams.use(channel, kind)
-
-    @property
-    def station_us(self) -> int | None:
-        return self._heartbeat.station_us
-
-    def expect_station(self, now_us: int) -> None:
-        """Count the station of before a restart as lost from now on."""
-        self._heartbeat.station_us = now_us
-
     def update(self, snapshot: TelemetrySnapshot) -> None:
         vehicle = self.pilot.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
-        self._heartbeat.update(snapshot)
+        self.heartbeat.update(snapshot)
         self.streams.update(snapshot)
         self.offboard.update(snapshot.position_enu_m, vehicle.euler[2], snapshot.origin, snapshot.home)
         self._follow.update(snapshot.origin)
@@ -215,7 +205,7 @@ class Stations:
     def go_on(self) -> None:
         """Send at least the mode if a snapshot fails."""
         self.modes.update()
-        self._heartbeat.go_on(self.modes.shown.number, armed=self.pilot.state.armed)
+        self.heartbeat.go_on(self.modes.shown.number, armed=self.pilot.state.armed)
 
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
         self.needs.at(now_us)
@@ -231,11 +221,9 @@ class Stations:
         self._said.extend(said)
         if said or self.snapshot is not self._logged:  # at control samples, not at each frame
             self._logged = self.snapshot
-            self._guard("flight log", self._log_flight, _nothing, said, now_us)
-        return self.take_outbox()
-
-    def _log_flight(self, said: list[Line], now_us: int) -> None:
-        self.log.update(self.snapshot, said, now_us, armed=self.pilot.state.armed)
+            armed = self.pilot.state.armed
+            self._guard("flight log", lambda: self.log.update(self.snapshot, said, now_us, armed=armed), _nothing)
+        return self.hub.take_outbox()
 
     def _poll_hub(self, now_us: int) -> None:
         for severity, text in self._lines.take():
@@ -259,9 +247,6 @@ class Stations:
         """Send the texts of a start."""
         for text in (self.system.banner, *self._conventions.banner):
             self.say(INFO, text)
-
-    def take_outbox(self) -> list[Outgoing]:
-        return self.hub.take_outbox()
 
     def warn(self, text: str) -> None:
         self.say(WARNING, text)

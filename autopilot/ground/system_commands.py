@@ -37,7 +37,7 @@ class SystemCommands:
             mav.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
             mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
-            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: self._set_origin,
+            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda it: self.set_origin(Geodetic(it.x, it.y, it.z)),
         }
 
     def shell(self) -> Mapping[str, ShellCommand]:
@@ -55,9 +55,6 @@ class SystemCommands:
             return Refusal(f"origin refused: {wrong or 'the rotors are armed'}")
         self._missions.move_origin(place)
         return None
-
-    def _set_origin(self, command: ReceivedCommand) -> Refusal | None:
-        return self.set_origin(Geodetic(command.x, command.y, command.z))
 
     def _calibrate(self, command: ReceivedCommand) -> Refusal | None:
         return self._calibration.begin(command, armed=self._pilot.state.armed)

@@ -183,7 +183,7 @@ class PreArm(Polled):
         if snapshot is not None and now_us >= self._due_us:
             self._due_us = now_us + _PREARM_EVERY_US
             if not snapshot.armed:
-                for reason in self._served.needs.refusals():
+                for reason in self._served.pilot.readiness.refusals():
                     self._served.say(CRITICAL, f"PreArm: {reason}")
         return ()
 

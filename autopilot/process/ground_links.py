@@ -81,7 +81,7 @@ class GroundLinks:
 
     def _open(self, stations: Stations, number: int, address: Address) -> None:
         channel = stations.hub.open(number, address)
-        stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
+        stations.streams.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
     def receive(self, stations: Stations) -> Iterator[Received]:
         """Yield datagrams within the time budget."""

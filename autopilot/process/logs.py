@@ -13,7 +13,7 @@ from colibri.autopilot.estimation.estimate import Estimate, FilterCheck
 from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, encoded
+from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup
 from colibri.common.process.log_files import LogError
 from colibri.common.process.shared_log import SharedLog
 from colibri.mavlink.hil.feedback import Feedback
@@ -125,7 +125,7 @@ class AutopilotLog:
         if self._received_bytes > MAX_RECEIVED_BYTES:
             return
         entry = ReceivedDatagram(link=link, address=address, loopback=owner, datagram=datagram)
-        record = encode_input(self._time_us, RecordKind.DATAGRAM, encoded(entry))
+        record = encode_input(self._time_us, RecordKind.DATAGRAM, msgspec.json.encode(entry))
         self._received_bytes += len(record)
         if self._received_bytes > MAX_RECEIVED_BYTES:
             self.say(self._time_us, WARNING, _FULL)
@@ -152,7 +152,7 @@ class AutopilotLog:
             self._begins = False
             setup = msgspec.structs.replace(self._setup, first_us=time_us)
             self.topics.begin(self.beginning())
-            self.topics.append(encode_input(time_us, RecordKind.SETUP, encoded(setup)))
+            self.topics.append(encode_input(time_us, RecordKind.SETUP, msgspec.json.encode(setup)))
         if datagram is None:
             return
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):

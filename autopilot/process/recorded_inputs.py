@@ -84,10 +84,6 @@ Input: TypeAlias = Setup | ReceivedDatagram
 _DECODER = msgspec.json.Decoder(Input)
 
 
-def encoded(what: Input) -> bytes:
-    return msgspec.json.encode(what)
-
-
 class RecordedInputs(NamedTuple):
     """Inputs by the time of a frame; several setups after restarts."""
 

@@ -69,7 +69,7 @@ class EventStation:
 
     def introduce(self, stations: Stations) -> None:
         """Open the channel, which streams nothing: answers are not read."""
-        stations.use(stations.hub.open(LINK, None), SILENT)
+        stations.streams.use(stations.hub.open(LINK, None), SILENT)
 
     def due(self, now_us: int | None) -> list[Received]:
         """Return what is due; what is past at a restart was sent before."""

@@ -75,7 +75,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     autopilot = copter_autopilot(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
     stations = autopilot.stages.stations
     for link in range(channels):
-        stations.use(stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
+        stations.streams.use(stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
     plant = PlantBuilder(plan.spec, plan.plant_vehicle, {plan.spec.feedback: nudged(plan.start)}).build(
         plan.spec.feedback, autopilot.frame_interval_us
     )

@@ -180,7 +180,7 @@ class Companion:
         if self.phase is CompanionPhase.CHECKING:
             if self._settings.stay is not None and self._newest is not None:
                 place = self._settings.stay.place(self._newest.state.position_enu_m)
-                self._box = rules.FlightRegion.at(place, self._settings.limits.margin_m)
+                self._box = rules.FlightRegion(place, place).around(place, self._settings.limits.margin_m)
             start = self._check_facts(now_us)
             self.failing = rules.failing(start)
             self.peer.reports_are_old = bool(rules.too_old(start.ages, in_flight=False))

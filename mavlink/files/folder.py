@@ -43,7 +43,7 @@ class Folder:
                 os.close(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFELY, 0o644, dir_fd=folder))
                 self._entries += 1
                 return
-        self._cut(names, 0)
+        self.truncate(names, 0)
 
     def write(self, names: Names, offset: int, data: bytes) -> None:
         with self._open_file(names, os.O_WRONLY) as file:
@@ -53,7 +53,11 @@ class Folder:
             self._size += more
 
     def truncate(self, names: Names, size: int) -> None:
-        self._cut(names, size)
+        with self._open_file(names, os.O_WRONLY) as file:
+            gone = os.fstat(file).st_size - size
+            if gone > 0:
+                os.ftruncate(file, size)
+                self._size -= gone
 
     def remove(self, names: Names) -> None:
         with self._open_parent(names) as (folder, name):
@@ -89,13 +93,6 @@ class Folder:
     def _read(self, names: Names, offset: int, count: int) -> bytes:
         with self._open_file(names, os.O_RDONLY) as file:
             return os.pread(file, count, offset)
-
-    def _cut(self, names: Names, size: int) -> None:
-        with self._open_file(names, os.O_WRONLY) as file:
-            gone = os.fstat(file).st_size - size
-            if gone > 0:
-                os.ftruncate(file, size)
-                self._size -= gone
 
     def _allow_new(self, name: str) -> None:
         if not can_be_new(name):

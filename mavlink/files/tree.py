@@ -83,10 +83,6 @@ def _fits(name: str) -> bool:
     return len(name.encode(errors="surrogatepass")) <= MAX_NAME_BYTES
 
 
-def reading_of(data: bytes) -> OpenFile:
-    return OpenFile(len(data), lambda offset, count: data[offset : offset + count])
-
-
 Generator: TypeAlias = Callable[[str], bytes]  # returns the content for a query, the text behind a question mark
 
 
@@ -121,7 +117,8 @@ class Tree:
             name, _, query = names[-1].partition("?")
             generator = self._generated.get((*names[:-1], name))
             if generator is not None:
-                return reading_of(generator(query))
+                data = generator(query)
+                return OpenFile(len(data), lambda offset, count: data[offset : offset + count])
         if names in self._folders:
             raise refused(EISDIR)
         files, rest = self._at(names)

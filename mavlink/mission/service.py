@@ -217,7 +217,7 @@ class MissionService:
 
     def choose(self, seq: int, reset: bool = False) -> Refusal | None:
         """Go to an item, as clients count."""
-        refusal = self._vehicle.set_current(self._inside(seq), reset)
+        refusal = self._vehicle.set_current(max(seq - self._offset, 0) if self._offset else seq, reset)
         if refusal is None and self._offset:
             self._chosen = min(seq, self._offset)
         return refusal
@@ -270,10 +270,6 @@ class MissionService:
         if plan_type != MISSION or home is None or not plan.items:
             return plan
         return StoredPlan((home(), *(behind(item, self._offset) for item in plan.items)), plan.id)
-
-    def _inside(self, seq: int) -> int:
-        """Return an item as the vehicle counts."""
-        return max(seq - self._offset, 0) if self._offset else seq
 
     def _request(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         plan_type, home = fields.mission_type, self._vehicle.home

@@ -103,7 +103,8 @@ class CommandService:
             return self._refused(fields.command, peer, UNSUPPORTED, "is not supported", now_us)
         if message.name == "COMMAND_LONG":
             return self._obey(handler, _from_long(fields, peer, now_us), fields.confirmation)
-        goes_to_a_place = _goes_to_a_place(fields.command)
+        definition = mav.enums["MAV_CMD"].get(fields.command)
+        goes_to_a_place = definition is not None and definition.has_location  # only then its frame counts
         if goes_to_a_place and fields.frame not in PLACES:
             return self._refused(fields.command, peer, UNSUPPORTED_MAV_FRAME, f"in frame {fields.frame}", now_us)
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
@@ -162,12 +163,6 @@ class CommandService:
             return []
         self._said = (refusal.reason, now_us)
         return self._text.say(_SEVERITIES.get(refusal.result, WARNING), refusal.reason)
-
-
-def _goes_to_a_place(number: int) -> bool:
-    """Whether x and y of a command are a place; only then its frame counts."""
-    definition = mav.enums["MAV_CMD"].get(number)
-    return definition is not None and definition.has_location
 
 
 def _from_long(fields: Any, peer: Peer, now_us: int) -> ReceivedCommand:

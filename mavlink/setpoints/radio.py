@@ -40,15 +40,11 @@ class Radio(Manual):
     """Keeps the channels of one radio; `fails` is SIM_RC_FAIL."""
 
     def __init__(self, system_id: int, text: StatusText, transmitter: tuple[int, ...], settings: RadioSettings) -> None:
-        """`transmitter` has the channels without overrides; `settings` are parameters by name."""
+        """`transmitter` has the channels without overrides, us; `settings` are parameters by name."""
         super().__init__(system_id, text)
-        self._transmitter, self._settings = transmitter, settings
+        self.transmitter, self._settings = transmitter, settings
         self._overrides: dict[int, int] = {}
         self._overridden_us = 0
-
-    def transmit(self, channels: tuple[int, ...]) -> None:
-        """Set the channels without overrides, us."""
-        self._transmitter = channels
 
     def _decode(self, message: Any, peer: Peer, now_us: int) -> Controls | None:
         if peer.system != self._settings["SYSID_MYGCS"]:
@@ -84,7 +80,7 @@ class Radio(Manual):
             self._overrides.clear()
         if fails == FAILED and not self._overrides:
             return ()
-        values = list(self._transmitter)
+        values = list(self.transmitter)
         if fails:
             values = [MIDDLE_US] * len(values)
             values[2] = LOW_US
@@ -96,12 +92,9 @@ class Radio(Manual):
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
         del timeout_us  # a radio is received or not
         self.held = channels = self.channels(now_us)
-        if not channels or self.throttle_failed(channels):
+        if not channels or (self._settings["FS_THR_ENABLE"] and channels[2] < self._settings["FS_THR_VALUE"]):
             return None
         return sticks_of(channels, now_us)
-
-    def throttle_failed(self, channels: tuple[int, ...]) -> bool:
-        return bool(self._settings["FS_THR_ENABLE"]) and channels[2] < self._settings["FS_THR_VALUE"]
 
 
 def _pulses(sticks: Sticks) -> Channels:

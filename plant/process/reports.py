@@ -89,16 +89,6 @@ def report_end(
     status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)
 
 
-_COLUMNS = len(TRUTH.names)
-
-
-def truth_row(world: World) -> tuple[float, ...]:
-    """Return a row of `TRUTH`, followed by the speeds of more than four rotors."""
-    battery = (world.voltage_v, world.charge_used_ah)
-    speeds, others = split(world.rotor_speeds)
-    return (world.time_us / 1e6, *world.state, *speeds, *battery, *world.wind_enu_m_s, *others)
-
-
 class TruthLog:
     """Writes the truth, also as PX4's topics where these are recorded."""
 
@@ -110,12 +100,14 @@ class TruthLog:
             self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count))
 
     def write_world(self, world: World) -> None:
-        row = truth_row(world)
-        self._log.add(TRUTH, row[:_COLUMNS])
-        if len(row) > _COLUMNS:
-            self._log.add(MORE_TRUTH, (row[0], *row[_COLUMNS:]))
+        speeds, others = split(world.rotor_speeds)
+        battery = (world.voltage_v, world.charge_used_ah)
+        row = (world.time_us / 1e6, *world.state, *speeds, *battery, *world.wind_enu_m_s)
+        self._log.add(TRUTH, row)
+        if others:
+            self._log.add(MORE_TRUTH, (row[0], *others))
         if self._blocks and self._thinning.is_due(world.time_us):
-            self._log.add(self._blocks, row)
+            self._log.add(self._blocks, (*row, *others))
 
 
 class PlantLogs:

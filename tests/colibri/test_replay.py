@@ -9,7 +9,7 @@ from pyulog import ULog
 
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
+from colibri.autopilot.process.recorded_inputs import read_inputs
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.ulog.flight_topics import COMMAND
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
@@ -114,8 +114,8 @@ def test_another_autopilot_is_found_out(copy: Path) -> None:
     log = FlightFile(copy / "flight.ulg")
     (setup,) = read_inputs(log.inputs()).setups.values()
     other = msgspec.structs.replace(setup, controller="geometric-se3", profile_tables=load_profile("se3"))
-    content = b"".join(log.encoded()) + encode_input(0, RecordKind.SETUP, encoded(other))  # the last one holds
-    (copy / "flight.ulg").write_bytes(content)
+    began_again = encode_input(0, RecordKind.SETUP, msgspec.json.encode(other))  # the last one holds
+    (copy / "flight.ulg").write_bytes(b"".join(log.encoded()) + began_again)
     difference = replay_flight(copy).difference
     assert difference is not None
     assert difference.recorded.time_us == 0
@@ -141,7 +141,8 @@ def test_a_log_without_frames_is_not_replayed(copy: Path, refused: Refused) -> N
     log = FlightFile(copy / "flight.ulg")
     (setup,) = read_inputs(log.inputs()).setups.values()
     commands = b"".join(map(COMMAND.encode, log.blocks(COMMAND)))
-    (copy / "flight.ulg").write_bytes(BEGINNING + encode_input(0, RecordKind.SETUP, encoded(setup)) + commands)
+    began = encode_input(0, RecordKind.SETUP, msgspec.json.encode(setup))
+    (copy / "flight.ulg").write_bytes(BEGINNING + began + commands)
     assert "flight.ulg: no frame of state feedback was answered" in refused("replay", copy)
 
 

@@ -107,7 +107,7 @@ class Vehicle:
             if len(datagram) in _RADIO_BYTES:
                 self._channels = tuple(value for (value,) in iter_unpack("<H", datagram))
         if self._channels and isinstance(radio, Radio):
-            radio.transmit(self._channels)
+            radio.transmitter = self._channels
 
     def close(self) -> None:
         self._radio.close()

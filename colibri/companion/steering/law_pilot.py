@@ -168,7 +168,8 @@ class LawPilot:
         now, then = y[model.RATE].tolist(), reached[motion.RATE].tolist()
         p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
-        return LawDemand((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
+        track_s = (time_us - self._flown.began_us) * 1e-6 if isinstance(self._flown, TrackTask) else -1.0
+        return LawDemand((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, track_s)
 
     def _carried(self, x: Array, speeds: Array) -> Array:
         interval_s, battery = np.array([self.interval_us * 1e-6]), self._vehicle.battery
@@ -192,10 +193,6 @@ class LawPilot:
         r = (turns * cos(theta) - sin(phi) * q) / max(cos(phi), _MIN_UPRIGHT)
         maximum = self._response.max_rate_rad_s[2]
         return min(max(r, -maximum), maximum)
-
-    def _track_s(self, time_us: int) -> float:
-        task = self._flown
-        return (time_us - task.began_us) * 1e-6 if isinstance(task, TrackTask) else -1.0
 
     def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, Vector | None]:
         generator = self._generator

@@ -160,11 +160,6 @@ def slowness(response: Response) -> float:
     return min(max(delay_s(response) / _AS_TUNED_S, 1.0), _MOST)
 
 
-def lateness_s(response: Response) -> float:
-    """Return the delay beyond the tuned one, s."""
-    return max(delay_s(response) - _AS_TUNED_S, 0.0)
-
-
 def slowed(profile: Profile, response: Response) -> Profile:
     """Slow a law down; laws with other weights are unchanged."""
     times = slowness(response)
@@ -218,7 +213,7 @@ class Predictor:
 
     def adopt(self, vehicle: Vehicle, response: Response) -> None:
         self._model = packed(response_model(vehicle, response))
-        late_s = _CORRECTED_IN_LATENESSES * lateness_s(response)
+        late_s = _CORRECTED_IN_LATENESSES * max(delay_s(response) - _AS_TUNED_S, 0.0)
         behind_s = np.array(response.acceleration_lag_s)
         self._late_s = np.maximum(late_s, _CORRECTED_IN_LAGS * behind_s)
         parts = _TURN_PART * slowness(response) ** -_TURN_POWER

@@ -22,23 +22,23 @@ _SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)  # coefficients of u^5 to u^9, ove
 _FIRST_POWER = 5
 
 
-def smoothly_started(track: Track, over_s: float = OVER_S) -> Track:
-    look, duration_s = track.yaw, track.duration_s + 0.5 * over_s
-    yaw = None if look is None else lambda t: look(_warped(t, over_s))
-    return replace(track, position=lambda t: track.position(_warped(t, over_s)), yaw=yaw, duration_s=duration_s)
+def smoothly_started(track: Track) -> Track:
+    look, duration_s = track.yaw, track.duration_s + 0.5 * OVER_S
+    yaw = None if look is None else lambda t: look(_warped(t))
+    return replace(track, position=lambda t: track.position(_warped(t)), yaw=yaw, duration_s=duration_s)
 
 
-def _warped(t: TaylorSeries, over_s: float) -> TaylorSeries:
-    u = t / over_s
+def _warped(t: TaylorSeries) -> TaylorSeries:
+    u = t / OVER_S
     power = u
     for _ in range(_FIRST_POWER):
         power = power * u
     begins = 0.0 * t
     for exponent, factor in enumerate(_SLOPE, _FIRST_POWER + 1):
-        begins = begins + power * (over_s * factor / exponent)
+        begins = begins + power * (OVER_S * factor / exponent)
         power = power * u
-    later = t - 0.5 * over_s
-    starts = t.coefficients[0] < over_s
+    later = t - 0.5 * OVER_S
+    starts = t.coefficients[0] < OVER_S
     return TaylorSeries(np.where(starts, begins.coefficients, later.coefficients))
 
 

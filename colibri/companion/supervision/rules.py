@@ -74,10 +74,6 @@ class FlightRegion(NamedTuple):
     def has(self, place: Vector) -> bool:
         return all(low <= x <= high for low, x, high in zip(self.lower, place, self.upper, strict=True))
 
-    @classmethod
-    def at(cls, place: Vector, margin_m: float) -> "FlightRegion":
-        return cls(place, place).around(place, margin_m)
-
     def around(self, place: Vector, margin_m: float) -> "FlightRegion":
         """Extend the box to a place and its margin."""
         lower = tuple(min(low, x - margin_m) for low, x in zip(self.lower, place, strict=True))

@@ -75,11 +75,11 @@ def test_do_set_mode_takes_every_number_of_the_table(flying: Cockpit, mode: Mode
 )
 def test_a_mission_starts_at_its_first_item(flying: Cockpit, params: tuple[float, ...], first: int | None) -> None:
     flying.load(MISSION, *[item("NAV_WAYPOINT", place=(20.0, north, 10.0)) for north in (0.0, 5.0, 10.0)])
-    flying.missions.set_current(1, False)
+    flying.missions.executor.set_current(1, False)
     outcome = flying.do("MISSION_START", *params)
     assert outcome.result == (DENIED if first is None else ACCEPTED)
     assert ("item" in outcome.reason) is (first is None)
-    assert flying.missions.progress().seq == (1 if first is None else first)
+    assert flying.missions.executor.progress.seq == (1 if first is None else first)
     flying.load(MISSION)
     assert flying.do("MISSION_START").reason == "mission refused: there is no mission"
 

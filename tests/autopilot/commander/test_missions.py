@@ -18,14 +18,14 @@ def test_a_mission_is_flown_item_after_item_and_then_held() -> None:
     assert not cockpit.missions.total
     cockpit.load(MISSION, *PLAN)
     assert cockpit.said("mission of 2 items")
-    assert (bool(cockpit.missions.total), cockpit.missions.progress().state) == (True, NOT_STARTED)
+    assert (bool(cockpit.missions.total), cockpit.missions.executor.progress.state) == (True, NOT_STARTED)
     assert cockpit.pilot.select(Mode.MISSION, {}) is None
     cockpit.step()
-    assert cockpit.missions.progress().state == ACTIVE
+    assert cockpit.missions.executor.progress.state == ACTIVE
     cockpit.fly_for(15.0)
     assert cockpit.missions.take_reached() == [0, 1]
     assert cockpit.missions.take_reached() == []
-    assert cockpit.missions.progress().state == COMPLETE
+    assert cockpit.missions.executor.progress.state == COMPLETE
     assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
     assert cockpit.said("Mission finished: hold")
     assert cockpit.state.position_enu_m == pytest.approx((5.0, 5.0, 10.0), abs=0.3)
@@ -38,10 +38,10 @@ def test_another_mode_pauses_it_and_it_goes_on_where_it_was() -> None:
     cockpit.fly_for(1.0)
     cockpit.pilot.select(Mode.HOLD, {})
     cockpit.step()
-    assert cockpit.missions.progress().state == PAUSED
+    assert cockpit.missions.executor.progress.state == PAUSED
     cockpit.pilot.select(Mode.MISSION, {})
     cockpit.fly_for(15.0)
-    assert cockpit.missions.progress().state == COMPLETE
+    assert cockpit.missions.executor.progress.state == COMPLETE
 
 
 def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
@@ -52,7 +52,7 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
     assert cockpit.said("Mission RTL item: return")
     assert cockpit.missions.take_reached() == [0, 1]
-    assert cockpit.missions.progress().state == COMPLETE
+    assert cockpit.missions.executor.progress.state == COMPLETE
     cockpit.fly_for(60.0)
     assert cockpit.pilot.state == FIRST
 
@@ -115,15 +115,15 @@ def test_plans_that_were_kept_go_on_where_the_mission_stood() -> None:
     before.load(MISSION, *PLAN)
     before.pilot.select(Mode.MISSION, {})
     before.fly_for(4.0)
-    record = before.missions.record()
+    record = before.missions.executor.record()
     plans = {RALLY: plan_of(()), FENCE: plan_of(()), MISSION: plan_of(PLAN)}
     after = Cockpit(FLYING)
     after.missions.resume(plans, record)
-    assert after.missions.progress() == before.missions.progress()
+    assert after.missions.executor.progress == before.missions.executor.progress
     after.missions.resume(plans, None)
-    assert after.missions.progress().seq == 0
+    assert after.missions.executor.progress.seq == 0
     after.missions.resume({**plans, MISSION: plan_of(())}, record)
-    assert after.missions.progress().state == NO_MISSION
+    assert after.missions.executor.progress.state == NO_MISSION
 
 
 def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
@@ -131,7 +131,7 @@ def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     for plan_type in (MISSION, FENCE, RALLY):
         cockpit.load(plan_type)
     assert cockpit.missions.changes == 3
-    assert cockpit.missions.set_current(0, False) == Refusal("no mission", FAILED)
+    assert cockpit.missions.executor.set_current(0, False) == Refusal("no mission", FAILED)
     cockpit.load(MISSION, *PLAN)
-    assert cockpit.missions.set_current(1, False) is None
-    assert cockpit.missions.progress().seq == 1
+    assert cockpit.missions.executor.set_current(1, False) is None
+    assert cockpit.missions.executor.progress.seq == 1

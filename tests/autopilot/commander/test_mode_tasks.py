@@ -60,7 +60,7 @@ def test_a_track_from_time_0_is_flown_once() -> None:
     assert isinstance(task, TrackTask)
     assert task.start is not None
     assert cockpit.pilot.generator.reference is task.start
-    assert not cockpit.tasks.is_first
+    assert cockpit.tasks.first is None
     assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.context()), TaskSequence)
 
 

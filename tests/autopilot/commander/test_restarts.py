@@ -127,7 +127,7 @@ def kept(kind: type[DATA], data: DATA) -> DATA:
 
 def restarted(before: Cockpit) -> Cockpit:
     after = Cockpit(PLACE)
-    after.missions.resume(PLANS, kept(MissionRecord, before.missions.record()))
+    after.missions.resume(PLANS, kept(MissionRecord, before.missions.executor.record()))
     task = kept(TaskRecord, task_record(before.pilot.task))
     after.pilot.resume(
         before.now_us,
