@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
-from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
+from colibri.autopilot.commander.mode_selection import ModeSelection
 from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.motion_commands import MotionCommands, denied
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode, Need
@@ -34,7 +35,7 @@ class Commanded(NamedTuple):
     pilot: Pilot
     fence: Fence
     missions: Missions
-    needs: Needs
+    needs: ModeNeeds
     tasks: ModeTasks
     parameters: Parameters
     book: ModeBook = PX4_MODES
@@ -173,6 +174,7 @@ class Commands:
         return Refusal("Preflight Fail: " + "; ".join(reasons), FAILED) if reasons else None
 
     def _judge_fence(self) -> None:
-        vehicle = self._pilot.sensed.vehicle
+        vehicle, readiness = self._pilot.sensed.vehicle, self._pilot.readiness
         if vehicle is not None:
-            self._pilot.readiness.judge_fence(self._fence.arming_refusal(vehicle.position_enu_m))
+            outside = self._fence.arming_refusal(vehicle.position_enu_m)
+            readiness.inputs = readiness.inputs._replace(outside_fence=outside)

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from math import isfinite, isnan, nan, pi, radians
 
 from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
+from colibri.autopilot.commander.mode_selection import ModeSelection
 from colibri.autopilot.commander.motion_commands import MAX_TURN_DEG, MIN_CLIMB_M, MotionCommands
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.guidance.tasks.guided import STOP, GuidedTask, Turn
@@ -35,7 +36,7 @@ class CopterMotion(MotionCommands):
         self,
         pilot: Pilot,
         fence: Fence,
-        needs: Needs,
+        needs: ModeNeeds,
         modes: ModeSelection,
         new_task: Callable[[], GuidedTask],
         circle: Callable[[], tuple[float, float]],

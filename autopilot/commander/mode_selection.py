@@ -1,26 +1,15 @@
 """The flight mode that clients see, and the vehicle's mode that flies it."""
 
-from collections.abc import Callable, Mapping
-from typing import Protocol
+from collections.abc import Callable
 
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import MANUAL, Mode, Need, State, first_missing
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode, State, first_missing
 from colibri.autopilot.commander.rules.shown_modes import ModeBook, ShownMode
-from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.refusal import Refusal
 
 THROTTLE_UP = 0.1  # of the stick's way; it starts a mission that waits
-
-
-class Needs(Protocol):
-    """Unmet needs of modes."""
-
-    def missing(self) -> Mapping[Need, str]: ...
-
-    def remark(self, mode: Mode) -> str: ...
-
-    def engage(self, peer: Peer, now_us: int) -> None: ...
 
 
 class ModeSelection:
@@ -32,7 +21,7 @@ class ModeSelection:
         base_modes: Of HEARTBEAT without the armed bit: without sticks, and with them.
     """
 
-    def __init__(self, book: ModeBook, pilot: Pilot, needs: Needs) -> None:
+    def __init__(self, book: ModeBook, pilot: Pilot, needs: ModeNeeds) -> None:
         self.book, self._pilot, self._needs = book, pilot, needs
         self._numbers = book.numbers
         self.shown = self._numbers[book.first]

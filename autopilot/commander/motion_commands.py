@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import dist, isnan, nan, pi, radians
 
 from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.mode_selection import Needs
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
@@ -32,7 +32,7 @@ NOT_FLYING = "the vehicle is not flying"
 
 
 class MotionCommands:
-    def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
+    def __init__(self, pilot: Pilot, fence: Fence, needs: ModeNeeds) -> None:
         self._pilot = pilot
         self._fence = fence
         self._needs = needs

@@ -1,32 +1,15 @@
 """Needs of flight modes, and the latest client inputs."""
 
-from typing import Protocol, TypeVar
-
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.task import ClientInputs
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
+from colibri.mavlink.setpoints.follow_target import Follow
+from colibri.mavlink.setpoints.manual_control import Manual
+from colibri.mavlink.setpoints.offboard import Offboard
 
 _TARGET_LOST_US = 10_000_000
-_T = TypeVar("_T", covariant=True)
-
-
-class Latest(Protocol[_T]):
-    """A service that keeps a client's latest input."""
-
-    def latest(self, now_us: int, timeout_us: int) -> _T | None: ...
-
-    def engage(self, peer: Peer, now_us: int) -> None: ...
-
-    def refusal(self, now_us: int) -> str: ...
-
-
-class LatestSticks(Latest[Sticks], Protocol):
-    """The sticks, and the channels of a radio behind them."""
-
-    held: tuple[int, ...]
 
 
 class ModeNeeds:
@@ -34,9 +17,9 @@ class ModeNeeds:
         self,
         pilot: Pilot,
         missions: Missions,
-        manual: LatestSticks,
-        offboard: Latest[OffboardSetpoint],
-        follow: Latest[TargetState],
+        manual: Manual,
+        offboard: Offboard,
+        follow: Follow,
         *,
         takes_attitude: bool,
     ) -> None:

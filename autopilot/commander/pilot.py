@@ -174,7 +174,7 @@ class Pilot:
     def adopt(self, behaviour: Behaviour) -> None:
         self.behaviour = behaviour
         if not behaviour.rotor_failure:
-            self.readiness.trust_rotors()
+            self.readiness.rotor_failed = ""
 
     def sense(self, sensed: Sensed) -> None:
         self.lag_us += sensed.waited_us

@@ -73,7 +73,7 @@ class FlightStart:
         parts.pilot.begin(frame.time_us, loop.observe(frame), mode=mode, rests=rests, delay_us=delay_us)
         parts.rotor_loss.forget()
         parts.actuation.begin(loop.vehicle.rotors.stopped if parts.pilot.ground.standing else loop.controls)
-        parts.pilot.readiness.trust_rotors()
+        parts.pilot.readiness.rotor_failed = ""
         self._catch(frame.time_us)
         parts.stations.introduce()
 

@@ -27,7 +27,7 @@ class Reporter:
         estimate, charge_state = parts.state_source.estimate, parts.supervisor.charge_state
         fence = stations.fence
         breach = fence.breach(state.position_enu_m, now_us, parts.supervisor.limits["GF_MARGIN"])
-        pilot.readiness.update(self._arming_inputs(state, estimate, fence.against_arming, charge_state))
+        pilot.readiness.inputs = self._arming_inputs(state, estimate, fence.against_arming, charge_state)
         if estimate is not None:
             for severity, line in self._health.lines(estimate.health):
                 stations.say(severity, line)

@@ -17,12 +17,7 @@ class ChoiceError(AutopilotError):
 def with_parameters(
     profile: Profile, vehicle: Vehicle, values: Mapping[str, Value], *, served: bool
 ) -> tuple[Profile, Vehicle]:
-    """Return the profile and the autopilot's vehicle with these parameters.
-
-    Raises:
-        ChoiceError: A parameter is unknown, out of range, or needs ground stations, and none is `served`.
-        ImpossibleError: The values contradict each other.
-    """
+    """Return the profile and the autopilot's vehicle with these parameters, or raise ChoiceError or ImpossibleError."""
     numbers = Numbers(profile, vehicle)
     known = {each.name: each for each in definitions(profile, vehicle)}
     for name, value in values.items():

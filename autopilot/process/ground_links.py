@@ -35,29 +35,6 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
     return links
 
 
-class Allowance:
-    """Time budget for received data, a share of all time; only processor time counts."""
-
-    def __init__(self, clock: Clock, processor_clock: Clock) -> None:
-        self._clock = clock
-        self._processor_clock = processor_clock
-        self._earned_s = clock()
-        self._began_s = 0.0
-        self._left_s = MAX_SAVED_S
-
-    def earn(self) -> None:
-        now_s = self._clock()
-        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MAX_SAVED_S)
-        self._earned_s = now_s
-
-    def begin(self) -> bool:
-        self._began_s = self._processor_clock()
-        return self._left_s > 0.0
-
-    def end(self) -> None:
-        self._left_s -= self._processor_clock() - self._began_s
-
-
 class GroundLinks:
     """Carries datagrams between links and a vehicle's hub.
 
@@ -68,11 +45,11 @@ class GroundLinks:
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
-        self._allowance = Allowance(clock, processor_clock)
+        self._clock, self._processor_clock = clock, processor_clock
+        self._earned_s, self._left_s = clock(), MAX_SAVED_S  # processor time left for datagrams
         self._owner = bool(links) and calls_this_computer(links[0].url)
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
-        self._clock = clock
         self._last: dict[tuple[int, Source], tuple[int, float]] = {}
 
     def introduce(self, stations: Stations) -> None:
@@ -85,7 +62,9 @@ class GroundLinks:
 
     def receive(self, stations: Stations) -> Iterator[Received]:
         """Yield datagrams within the time budget."""
-        self._allowance.earn()
+        now_s = self._clock()
+        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MAX_SAVED_S)
+        self._earned_s = now_s
         for number, link in enumerate(self._links):
             if not self._waiting[number]:
                 self._waiting[number].extend(link.receive_now())
@@ -103,11 +82,12 @@ class GroundLinks:
             for number, waiting in enumerate(self._waiting):
                 if not waiting:
                     continue
-                if not self._allowance.begin():
+                began_s = self._processor_clock()
+                if self._left_s <= 0.0:
                     return
                 datagram, address = waiting.popleft()
                 yield Received(datagram, number, address, self._owner and number == 0)
-                self._allowance.end()
+                self._left_s -= self._processor_clock() - began_s
 
     def _forget(self, stations: Stations, number: int, address: Address) -> None:
         self._opened = [opened for opened in self._opened if opened != (number, address)]
@@ -116,13 +96,13 @@ class GroundLinks:
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send each datagram; failures are lost datagrams."""
-        self._allowance.begin()
+        began_s = self._processor_clock()
         for number, address, datagram in outbox:
             try:
                 self._links[number].send(datagram, address)
             except LinkError:
                 continue
-        self._allowance.end()
+        self._left_s -= self._processor_clock() - began_s
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
         facts = []

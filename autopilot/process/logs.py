@@ -65,7 +65,10 @@ class AutopilotLog:
         """
         time_us = step.command.time_us
         if time_us < self._time_us:
-            self._begin_anew()
+            self.topics.close()
+            self._received_bytes = self._said_bytes = 0
+            self._status_us, self._thinning = -1, Thinning()
+            self._fallback, self._begins = None, True
         self._time_us = time_us
         if self.topics.for_viewers:
             self._write_input(step, datagram)
@@ -137,13 +140,6 @@ class AutopilotLog:
 
     def close(self) -> None:
         self.topics.close()
-
-    def _begin_anew(self) -> None:
-        self.topics.close()
-        self._received_bytes = self._said_bytes = 0
-        self._status_us, self._thinning = -1, Thinning()
-        self._fallback = None
-        self._begins = True
 
     def _write_input(self, step: Step, datagram: bytes | None) -> None:
         """Write the inputs of a replay; frames of states follow from the truth."""

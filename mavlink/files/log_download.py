@@ -71,7 +71,10 @@ class Logs:
         if message.name == "LOG_REQUEST_DATA":
             return self._transfer(peer, fields.id, fields.ofs, fields.count)
         if message.name == "LOG_ERASE":
-            self._erase()
+            kept = self._being_written()
+            self._erasing = {entry.name: None for entry in self._logs() if entry.name != kept}
+            for known in (self._shown, self._listings, self._transfers):
+                known.clear()
         elif message.name == "LOG_REQUEST_END":
             self._stop(peer)
         return ()
@@ -150,13 +153,6 @@ class Logs:
     def _stop(self, peer: Peer) -> None:
         self._listings.pop(peer, None)
         self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
-
-    def _erase(self) -> None:
-        kept = self._being_written()
-        self._erasing = {entry.name: None for entry in self._logs() if entry.name != kept}
-        self._shown.clear()
-        self._listings.clear()
-        self._transfers.clear()
 
 
 def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:

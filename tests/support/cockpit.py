@@ -78,7 +78,8 @@ class Cockpit:
         self.pilot = Pilot(planned_at, behaviour, self.tasks.begin, self.home, self.lines)
         self.unmet: tuple[Need, ...] = (Need.CIRCLE,)
         self.engaged: list[tuple[Peer, int]] = []
-        self.commands = Commands(Commanded(self.pilot, self.fence, self.missions, self, self.tasks, Parameters(())))
+        needs: Any = self
+        self.commands = Commands(Commanded(self.pilot, self.fence, self.missions, needs, self.tasks, Parameters(())))
         self.now_us = 0
         self.state = at(place)
         self.steered: ClientInputs = NOT_STEERED
@@ -134,4 +135,6 @@ class Cockpit:
 
     def stock(self, **changes: Any) -> None:
         """Let the pilot know what arming is judged by: all is well but for `changes`."""
-        self.pilot.readiness.update(ArmingInputs(self.state, self.pilot.ground.standing, 1.0, None)._replace(**changes))
+        self.pilot.readiness.inputs = ArmingInputs(self.state, self.pilot.ground.standing, 1.0, None)._replace(
+            **changes
+        )

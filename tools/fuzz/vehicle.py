@@ -202,7 +202,7 @@ class FuzzedVehicle:
             copter.stations.plans.load(plan, ())
         self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE)
         copter.parts.rotor_loss.forget()  # what has lost a rotor is not armed again, by force neither
-        copter.pilot.readiness.trust_rotors()
+        copter.pilot.readiness.rotor_failed = ""
         flight.reset_world(STANDING)
         flight.run(0.8)
         flight.send("SET_GPS_GLOBAL_ORIGIN", SYSTEM, *_integers(DEFAULT_ORIGIN))

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.mavlink.services.statustext import EMERGENCY
-from colibri.mavlink.wire.refusal import Refusal
 
 
 class Readiness:
@@ -13,24 +12,18 @@ class Readiness:
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
-        self._inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
+        self.inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
         self.further: Callable[[], Iterable[str]] | None = None  # reasons of an identity's own checks
         self.rotor_failed = self.error = ""
         self.descends = self._lands = False
 
-    def update(self, inputs: ArmingInputs) -> None:
-        self._inputs = inputs
-
-    def judge_fence(self, outside: Refusal | None) -> None:
-        self._inputs = self._inputs._replace(outside_fence=outside)
-
     def refusals(self) -> list[str]:
         further = () if self.further is None else self.further()
-        return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error)), *further]
+        return [*refusals(self.inputs), *filter(None, (self.rotor_failed, self.error)), *further]
 
     @property
     def may_arm(self) -> bool:
-        if self.rotor_failed or self.error or next(refusals(self._inputs), None) is not None:
+        if self.rotor_failed or self.error or next(refusals(self.inputs), None) is not None:
             return False
         return self.further is None or not any(self.further())
 
@@ -45,6 +38,3 @@ class Readiness:
     def lose_rotor(self, rotor: int, remaining: str = "three rotors", *, lands: bool = True) -> None:
         self.rotor_failed, self._lands = f"rotor {rotor + 1} failed", lands
         self._lines.say(EMERGENCY, f"{self.rotor_failed}: {'landing' if lands else 'flying'} on {remaining}")
-
-    def trust_rotors(self) -> None:
-        self.rotor_failed = ""

@@ -134,27 +134,21 @@ class Consistency:
     def add(self, at_us: int, state: TimedState) -> None:
         now, last = ReceivedState(at_us, state), self._last
         self._last = now
-        if last is not None and (at_us - last.at_us) * 1e-6 < MAX_JUMP_GAP_S:
-            self._judge_jump(last, now)
-        if last is None or self._start is None or not 0.0 < (at_us - last.at_us) * 1e-6 <= MAX_GAP_S:
+        passed_s = 0.0 if last is None else (at_us - last.at_us) * 1e-6
+        if last is not None and passed_s < MAX_JUMP_GAP_S:
+            there = _moved(last.state.position_enu_m, last.state.velocity_enu_m_s, passed_s)
+            self.jumped_m = max(self.jumped_m, dist(there, state.position_enu_m))
+        if last is None or self._start is None or not 0.0 < passed_s <= MAX_GAP_S:
             self._begin(now)
             self._windows, self.contradiction = 0, ""
             return
-        passed_s = (at_us - last.at_us) * 1e-6
         p, q, r = _mean(last.state.rate_flu_rad_s, state.rate_flu_rad_s)
         self._turned = _turned(self._turned, (p * passed_s, q * passed_s, r * passed_s))
-        vx, vy, vz = _mean(last.state.velocity_enu_m_s, state.velocity_enu_m_s)
-        x, y, z = self._moved
-        self._moved = (x + vx * passed_s, y + vy * passed_s, z + vz * passed_s)
+        velocity = _mean(last.state.velocity_enu_m_s, state.velocity_enu_m_s)
+        self._moved = _moved(self._moved, velocity, passed_s)
         if (at_us - self._start.at_us) * 1e-6 >= WINDOW_S:
             self._judge(state)
             self._begin(now)
-
-    def _judge_jump(self, last: ReceivedState, now: ReceivedState) -> None:
-        passed_s = (now.at_us - last.at_us) * 1e-6
-        (x, y, z), (vx, vy, vz) = last.state.position_enu_m, last.state.velocity_enu_m_s
-        there = (x + passed_s * vx, y + passed_s * vy, z + passed_s * vz)
-        self.jumped_m = max(self.jumped_m, dist(there, now.state.position_enu_m))
 
     def _begin(self, now: ReceivedState) -> None:
         self._start, self._turned, self._moved = now, now.state.attitude, now.state.position_enu_m
@@ -169,6 +163,10 @@ class Consistency:
             found = "position and velocity"
         self._windows = self._windows + 1 if found else 0
         self.contradiction = f"{found} contradict each other" if self._windows >= _WINDOWS else ""
+
+
+def _moved(place: Vector, velocity: Vector, for_s: float) -> Vector:
+    return (place[0] + velocity[0] * for_s, place[1] + velocity[1] * for_s, place[2] + velocity[2] * for_s)
 
 
 def _mean(a: Vector, b: Vector) -> Vector:

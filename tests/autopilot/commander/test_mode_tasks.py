@@ -1,9 +1,11 @@
 """The table of modes and what each begins with, and which of their needs are met."""
 
+from typing import Any
+
 import pytest
 
 from colibri.autopilot.commander.missions import MissionTask
-from colibri.autopilot.commander.needs import Latest, LatestSticks, ModeNeeds
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
@@ -13,7 +15,7 @@ from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
+from colibri.mavlink.setpoints.setpoints import Sticks
 from tests.support.cockpit import FLYING, Cockpit, item
 
 BEGINS = {
@@ -90,13 +92,9 @@ class Somebody(Nobody):
 
 
 def needs_of(
-    cockpit: Cockpit,
-    manual: LatestSticks | None = None,
-    offboard: Latest[OffboardSetpoint] | None = None,
-    follow: Latest[TargetState] | None = None,
+    cockpit: Cockpit, manual: Nobody | None = None, offboard: Nobody | None = None, follow: Nobody | None = None
 ) -> ModeNeeds:
-    nobody = Nobody()
-    services = (manual or nobody, offboard or nobody, follow or nobody)
+    services: tuple[Any, ...] = tuple(each or Nobody() for each in (manual, offboard, follow))
     return ModeNeeds(cockpit.pilot, cockpit.missions, *services, takes_attitude=True)
 
 
