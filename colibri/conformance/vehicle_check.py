@@ -16,7 +16,6 @@ from colibri.analysis.tables import markdown, print_table
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.scaling import capability_of
-from colibri.autopilot.spec import LawSpec
 from colibri.campaigns.engines import Engine, in_order
 from colibri.campaigns.run import engine_of
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
@@ -24,6 +23,7 @@ from colibri.conformance.subject import Result
 from colibri.conformance.vehicle_flights import (
     EMPTY,
     FAR_M,
+    HOVER,
     MAX_FACTOR,
     NUMBERS,
     TRIALS,
@@ -35,6 +35,7 @@ from colibri.conformance.vehicle_flights import (
     thrust_ratio,
 )
 from colibri.flights.folder import make_folder
+from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 HEADINGS = ("check", "result", "found", "near from", "fails from", "why")
@@ -146,10 +147,10 @@ class _Subject(NamedTuple):
 
     @classmethod
     def of(cls, vehicle: str | Vehicle, profile: Any, controller: Any, seed: int, workers: int | None) -> "_Subject":
-        spec = LawSpec(profile=profile, controller=controller, vehicle=load_vehicle(vehicle))
+        law = {"profile": profile, "controller": controller, "seed": seed}
+        spec = FlightSpec.of(HOVER, vehicle=load_vehicle(vehicle), **law)
         chosen, described = spec.load()
         build_controller(chosen, described, perf_counter, spec.law)
-        law = {"profile": profile, "controller": controller, "seed": seed}
         return cls(described, chosen, law, engine_of(workers, None))
 
     def check(self, *, quiet: bool) -> VehicleCheck:

@@ -18,6 +18,7 @@ from colibri.common.errors import Error
 from colibri.conformance.subject import Result
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec, Window
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.vehicle.description import Vehicle
 
 HEIGHT_M, OFF_M = 12.0, 2.0
@@ -114,7 +115,7 @@ def fly(vehicle: Vehicle, trial: Trial, law: Mapping[str, Any], assumed: Vehicle
     try:
         options = {"vehicle": assumed or vehicle, "link": "direct", "window": window, **law, **trial.options(vehicle)}
         plan = FlightPlan.of(FlightSpec.of(**options, duration=trial.duration_s))
-        if trial.off_m:
+        if plan.spec.feedback is Feedback.STATE:
             x, y, z = position(plan.track, np.zeros(1))[0]
             start = {"x": x, "y": y - trial.off_m, "z": z, "rotors": vehicle.hover_rpm}
             plan = FlightPlan.of(FlightSpec.of(**options, duration=trial.duration_s, start=start))

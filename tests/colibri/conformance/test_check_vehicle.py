@@ -33,7 +33,8 @@ def test_the_hummingbird_flies(trial: str) -> None:
 
 def test_a_vehicle_that_lifts_little_more_than_itself_flies_but_carries_nothing() -> None:
     weak = with_thrust(1.08)
-    assert fly(weak, TRIALS["hover"], LAW).lost == ""
+    assert fly(weak, TRIALS["hover"], LAW) == ("", 0.0, 0.0)
+    assert fly(weak, TRIALS["hover"], {"profile": "se3"}).error_m < 1e-3  # on the track, wherever the profile starts
     assert fly(weak, TRIALS["10 % more mass"], LAW).lost.startswith("refused: rotors.max_speed")
 
 
@@ -75,6 +76,11 @@ def test_the_figure_has_a_bar_for_each_number() -> None:
 def test_a_vehicle_too_heavy_for_its_rotors_is_bad_input(refused: Refused, tmp_path: Path) -> None:
     file = edited(VEHICLE, "mass_kg = 0.698", "mass_kg = 1.55")(tmp_path)
     assert "at least 1.05 is required" in refused("check-vehicle", file, "--out", str(tmp_path / "out"))
+
+
+def test_an_impossible_seed_is_bad_input() -> None:
+    with pytest.raises(colibri.Error, match="seed"):
+        check_vehicle("hummingbird", seed=-1)
 
 
 @pytest.mark.long
