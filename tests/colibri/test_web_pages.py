@@ -90,9 +90,8 @@ def px4_simulator() -> Iterator[Served]:
 def station() -> Iterator[Served]:
     with closing(open_ground_link(HERE)) as link:
         links, taken, said = GroundLinks([link], lambda: 0.0, lambda: 0.0), list[object](), list[str]()
-        stations = cast(
-            Any, SimpleNamespace(use=lambda *_: None, hub=SimpleNamespace(open=lambda *_: 0, close=lambda *_: None))
-        )
+        hub = SimpleNamespace(open=lambda *_: 0, close=lambda *_: None)
+        stations = cast(Any, SimpleNamespace(hub=hub, streams=SimpleNamespace(use=lambda *_: None)))
 
         def turn() -> None:
             taken.extend(links.receive(stations))
