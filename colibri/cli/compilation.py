@@ -8,9 +8,9 @@ from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
-from colibri.campaigns.engines import in_order
 from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
+from colibri.mavlink.links.startup import COMPILING
 
 FLIGHTS: dict[str, dict[str, Any]] = {
     "flight": {},
@@ -28,12 +28,30 @@ def compile(args: Namespace) -> int:
     for name in args.what:
         if name not in FLIGHTS:
             fail(unknown("flight to compile", name, FLIGHTS))
-    jobs = [name for name in FLIGHTS if name in (args.what or FLIGHTS) for _ in range(_SHARED_BY)]
-    with one_line(EXIT_FAILED), nullcontext() if args.quiet else _progress():
-        in_order(_fly, jobs, "compiling", quiet=True)
+    names = [name for name in FLIGHTS if name in (args.what or FLIGHTS)]
+    with one_line(EXIT_FAILED):
+        _compile(names, quiet=args.quiet)
     if not args.quiet:
-        sys.stdout.write(f"compiled for {', '.join(dict.fromkeys(jobs))} in {perf_counter() - began_s:.0f} s\n")
+        sys.stdout.write(f"compiled for {', '.join(names)} in {perf_counter() - began_s:.0f} s\n")
     return 0
+
+
+def compile_first(profile: str, *, quiet: bool) -> None:
+    """Compile on all cores if nothing was compiled yet: a flight itself compiles most on one."""
+    from colibri.common.machine_code.on_disk import folder_to_write
+
+    folder = folder_to_write()
+    if folder and not any(folder.glob("colibri.plant.*.nbc")):
+        if not quiet:
+            sys.stderr.write(f"{COMPILING}\n")
+        _compile([profile if profile in FLIGHTS else "flight"], quiet=quiet)
+
+
+def _compile(names: list[str], *, quiet: bool) -> None:
+    from colibri.campaigns.engines import in_order
+
+    with nullcontext() if quiet else _progress():
+        in_order(_fly, [name for name in names for _ in range(_SHARED_BY)], "compiling", quiet=True)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeAlias
 
 from colibri.analysis.limits import exceeded, loss_exceeds
+from colibri.cli.compilation import compile_first
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted, one_line
@@ -35,6 +36,7 @@ def fly(args: argparse.Namespace) -> int:
 def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     prepare(plan.out)
     try:
+        compile_first(args.profile, quiet=args.quiet)
         with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
             for note in filter(None, (plan.track_note, in_words(plan.without_effect.items()))):
                 say(note)
