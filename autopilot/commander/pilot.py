@@ -294,14 +294,8 @@ class Pilot:
                 return self._idle()
             self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
-        if self.sensed.lift is not None and self._comes_down:
-            now_us, lift, push, interval_s = (
-                self.sensed.now_us,
-                self.sensed.lift,
-                self.sensed.push,
-                self.generator.interval_s,
-            )
-            self.ground.watch_forces(now_us, context.state, lift, push, interval_s)
+        if self._has_hit_ground(context.state):
+            return self._fallen()
         ended = _ENDS.get(self.state.mode)
         if ended is not None and self.task.arrived(context):
             self.happened(ended)
@@ -327,9 +321,15 @@ class Pilot:
         self._stop_rotors(Event.TOUCHED_DOWN, _IMPACT)
         return self._rest()
 
-    @property
-    def _comes_down(self) -> bool:
-        return self.state.mode is Mode.LAND or is_below(self.context().reference.height_m, self.context().state)
+    def _has_hit_ground(self, vehicle: VehicleState) -> bool:
+        """Watch for the ground by forces if a sensor has failed; return whether the contact was an impact."""
+        sensed, generator = self.sensed, self.generator
+        if sensed.lift is None or generator.reference is None:
+            return False
+        comes_down = self.state.mode is Mode.LAND or is_below(generator.reference.height_m, vehicle)
+        return comes_down and self.ground.watch_forces(
+            sensed.now_us, vehicle, sensed.lift, sensed.push, generator.interval_s
+        )
 
     def _rest(self) -> Guidance:
         now_us, vehicle, *_ = self.sensed

@@ -121,13 +121,15 @@ class GroundContact:
             self.land(now_us)
         return stands and fell
 
-    def watch_forces(self, now_us: int, vehicle: VehicleState, lift: float, push: float, interval_s: float) -> None:
-        """Detect ground without trust in the estimate, while the vehicle comes down."""
+    def watch_forces(self, now_us: int, vehicle: VehicleState, lift: float, push: float, interval_s: float) -> bool:
+        """Detect ground by forces while the vehicle comes down; return whether the contact was an impact."""
         climb_m_s = vehicle.velocity_enu_m_s[2]
         self._lack = self._lack.after(lift, climb_m_s, interval_s)
         touches = is_touching(push, vehicle, self.height_m)
-        if (touches or self._lack.is_carried(climb_m_s)) and not self.standing:
-            self.land(now_us)
+        if self.standing or not (touches or self._lack.is_carried(climb_m_s)):
+            return False
+        self.land(now_us)
+        return bool(self.impact)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:
         """Process a sample with rotors stopped or idling, also in a fall."""

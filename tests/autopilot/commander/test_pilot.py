@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colibri.autopilot.commander.pilot import Sensed
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
@@ -14,7 +15,7 @@ from colibri.autopilot.guidance.tasks.position import HoldTask
 from colibri.autopilot.guidance.tasks.task import ClientInputs
 from colibri.mavlink.mission.items import MISSION
 from colibri.mavlink.setpoints.setpoints import Sticks
-from tests.support.cockpit import FLYING, Cockpit, at, item
+from tests.support.cockpit import FLYING, PREVIEW, Cockpit, at, item
 
 STICKS = ClientInputs(sticks=Sticks(0.0, 0.0, 0.5, 0.0))
 LEADS = {
@@ -110,6 +111,19 @@ def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
     assert cockpit.pilot.state == FIRST
     assert cockpit.guidance is RESTS
     assert [text for _, text in cockpit.lines.take()][-2:] == ["Landing detected", "Disarmed by landing"]
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.LAND, Mode.POSITION])
+def test_an_impact_with_a_failed_sensor_stops_the_rotors(mode: Mode) -> None:
+    cockpit = in_the_air()
+    assert cockpit.pilot.select(mode, {}) is None
+    drifting = at((0.0, 0.0, 10.5), (4.0, 0.0, 0.0))  # by its estimate, which would have it take off again
+    for _ in range(30):
+        cockpit.now_us += PREVIEW.interval_us
+        cockpit.pilot.sense(Sensed(cockpit.now_us, drifting, STICKS, lift=0.1))
+        cockpit.pilot.step()
+    assert cockpit.pilot.state == FIRST
+    assert [text for _, text in cockpit.lines.take()][-2:] == ["Impact at 4.0 m/s", "Disarmed by impact"]
 
 
 def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
