@@ -205,7 +205,9 @@ class CopterCommands(Commands):
         return None
 
     def _jump_to_tag(self, command: ReceivedCommand) -> Refusal | None:
-        valid = 0.0 <= command.p1 <= _MAX_TAG
+        executor, valid = self._missions.executor, 0.0 <= command.p1 <= _MAX_TAG
+        if command.p1 in executor.tags:
+            return executor.set_current(executor.tags[command.p1])
         return Refusal(f"mission: there is no tag {command.p1:g}", FAILED if valid else DENIED)
 
     def _calibrate(self, command: ReceivedCommand) -> Refusal | None:

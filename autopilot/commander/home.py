@@ -6,7 +6,7 @@ from colibri.mavlink.wire.places import far
 from colibri.mavlink.wire.refusal import Refusal
 
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
-_DEEP_M = 10.0
+_OFF_M = 10.0
 _UNCERTAIN_M = 0.5  # allowed difference between estimated heights and heights above sea level
 
 
@@ -29,8 +29,9 @@ class Home:
 
     def doubt(self, here: Vector) -> str:
         """Return why home may be a mistake for a vehicle `here`, or an empty text."""
-        away, below_m = far(self.position_enu_m, here), -self.position_enu_m[2]
-        return f"home: {away}" if away else f"home: {below_m:.0f} m below the ground" if below_m > _DEEP_M else ""
+        away, up_m = far(self.position_enu_m, here), self.position_enu_m[2]
+        side = "above" if up_m > 0.0 else "below"
+        return f"home: {away}" if away else f"home: {abs(up_m):.0f} m {side} the ground" if abs(up_m) > _OFF_M else ""
 
     def refusal(self, height_m: float) -> Refusal | None:
         """Refuse a height, z of ENU, m, that is below both the origin and home."""

@@ -6,7 +6,7 @@ Autocontinue is ignored, as in ArduPilot, because DroneKit recommends 0 for it.
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, FENCE_SWITCH, place_of
+from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, FENCE_SWITCH, jump_tags, place_of
 from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, LegPhase, MissionContext, phases_of
 from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
 from colibri.common.types import Vector
@@ -25,6 +25,7 @@ COMPLETE: int = mav.MISSION_STATE_COMPLETE
 MAX_ITEMS_A_STEP = 16  # most items started in a step
 REST_US = 1_000_000  # delay between jumps without flight between them
 CIRCLING_AFTER = 3  # jumps without flight between them
+_JUMPS = (mav.MAV_CMD_DO_JUMP, mav.MAV_CMD_DO_JUMP_TAG)
 _HOLD = Hold()
 _DEFAULTS = Defaults()
 _FLYING, _SUSPENDED = 1, 2
@@ -88,6 +89,7 @@ class MissionExecutor:
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
         self.defaults = defaults
         self.items: tuple[MissionItem, ...] = ()
+        self.tags: dict[float, int] = {}
         self.progress = MissionProgress()
         self._order: Order = _HOLD
         self._speed_m_s: float | None = None
@@ -108,7 +110,7 @@ class MissionExecutor:
     def load(self, items: Sequence[MissionItem]) -> None:
         """Replace the plan; an active mission restarts."""
         flying = self.active
-        self.items = tuple(items)
+        self.items, self.tags = tuple(items), jump_tags(items)
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
 
@@ -239,7 +241,7 @@ class MissionExecutor:
             events.append(AuxFunction(int(item.p1), int(item.p2)))
         elif item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
             events.append(AuxFunction(FENCE_SWITCH, 2 if item.p1 == 1.0 else 0))
-        elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us, events):
+        elif item.command in _JUMPS and self._jump(item, now_us, events):
             return
         self._advance()
 
@@ -250,7 +252,7 @@ class MissionExecutor:
             return False
         self._jumps[seq] = max(left - 1, -1)
         self._leave()
-        self._show(int(item.p1), ACTIVE)
+        self._show(self.tags[item.p1] if item.command == mav.MAV_CMD_DO_JUMP_TAG else int(item.p1), ACTIVE)
         if self._jumped:
             self._rest_until_us = now_us + REST_US
         self._jumped += 1

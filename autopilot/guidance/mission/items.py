@@ -79,8 +79,8 @@ _ALLOWED: Mapping[int, _Allowed] = {
     mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),
 }
 FLOWN: frozenset[int] = frozenset(_ALLOWED)
-_COPTERS_SKIPPED = (208, 212, 215, 216, 222, 223, 600)
-"""Parachute, autotune, repeated way, sprayer, limits of GUIDED, engine, jump tag."""
+_COPTERS_SKIPPED = (208, 212, 215, 216, 222, 223)
+"""Parachute, autotune, repeated way, sprayer, limits of GUIDED, engine."""
 _COPTERS: Mapping[int, _Allowed] = {  # as ArduCopter: a place of 0, 0 is where the vehicle is going
     **{command: allowed._replace(here=allowed.place) for command, allowed in _ALLOWED.items()},
     mav.MAV_CMD_NAV_SPLINE_WAYPOINT: _Allowed(True, True, here=True),
@@ -89,6 +89,8 @@ _COPTERS: Mapping[int, _Allowed] = {  # as ArduCopter: a place of 0, 0 is where 
     mav.MAV_CMD_NAV_VTOL_LAND: _Allowed(True, here=True),
     mav.MAV_CMD_DO_FENCE_ENABLE: _Allowed(p1=_one_of(0.0, 1.0, 2.0)),
     **dict.fromkeys(_COPTERS_SKIPPED, _Allowed()),
+    mav.MAV_CMD_JUMP_TAG: _Allowed(p1=_whole(0, 0xFFFF)),
+    mav.MAV_CMD_DO_JUMP_TAG: _Allowed(p1=_whole(0, 0xFFFF), p2=_whole(-1, 0xFFFF)),
     DO_AUX_FUNCTION: _Allowed(p1=_whole(0, 0xFFFF), p2=_one_of(0.0, 1.0, 2.0)),
 }
 COPTERS_MAX_HEIGHT_M = 83_000.0  # AP_Common/Location.h
@@ -116,10 +118,19 @@ def check_item(item: MissionItem, table: Mapping[int, _Allowed] = _ALLOWED, max_
 
 
 def check_mission(items: Sequence[MissionItem]) -> tuple[int, int]:
-    """Check that jumps stay inside."""
-    jumps = (seq for seq, item in enumerate(items) if item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items))
-    outside = next(jumps, None)
-    return (ACCEPTED, 0) if outside is None else (int(mav.MAV_MISSION_INVALID_PARAM1), outside)
+    """Check that jumps lead to an item."""
+    tags = jump_tags(items)
+    for seq, item in enumerate(items):
+        outside = item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items)
+        if outside or (item.command == mav.MAV_CMD_DO_JUMP_TAG and item.p1 not in tags):
+            return int(mav.MAV_MISSION_INVALID_PARAM1), seq
+    return ACCEPTED, 0
+
+
+def jump_tags(items: Sequence[MissionItem]) -> dict[float, int]:
+    """Return the first item of each tag."""
+    tagged = [(item.p1, seq) for seq, item in enumerate(items) if item.command == mav.MAV_CMD_JUMP_TAG]
+    return dict(reversed(tagged))
 
 
 def check_rally_item(item: MissionItem) -> int:

@@ -115,7 +115,8 @@ def test_low_places_and_low_homes_are_warned_of() -> None:
     for command in ("DO_REPOSITION", "DO_ORBIT"):
         result, said = ask(flying(), command, 0, LATITUDE, LONGITUDE, ALTITUDE_M)
         assert (result, "along the ground" in said) == (ACCEPTED, True)
-    assert "488 m below the ground" in ask(flying(), "DO_SET_HOME", 0, LATITUDE, LONGITUDE, 0.0)[1]
+    for altitude_m, words in ((0.0, "488 m below the ground"), (2.0 * ALTITUDE_M, "488 m above the ground")):
+        assert words in ask(flying(), "DO_SET_HOME", 0, LATITUDE, LONGITUDE, altitude_m)[1]
 
 
 def made(command: int, frame: int, x: float, y: float, height_m: float = 5.0) -> MissionItem:

@@ -3,6 +3,8 @@
 from math import dist, isclose
 from typing import Any
 
+import pytest
+
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.wire.dialect import mav
@@ -55,6 +57,10 @@ def index_validity(sitl: Sitl) -> None:
 def jump_tags(sitl: Sitl) -> None:
     assert sitl.command(mav.MAV_CMD_DO_JUMP_TAG, 65535.0) == FAILED
     assert sitl.command(mav.MAV_CMD_DO_JUMP_TAG, 65536.0) == DENIED
+    upload(sitl, items.takeoff(5.0), items.Item(mav.MAV_CMD_JUMP_TAG, (7.0,)))
+    assert sitl.command(mav.MAV_CMD_DO_JUMP_TAG, 7.0) == ACCEPTED
+    with pytest.raises(sitl.Refused, match=r"item 1: DO_JUMP_TAG \(601\): parameter 1 is 8"):
+        upload(sitl, items.Item(mav.MAV_CMD_DO_JUMP_TAG, (8.0, 1.0)))
 
 
 def mission_start_parameters(sitl: Sitl) -> None:

@@ -190,6 +190,14 @@ def test_jumps_are_counted() -> None:
     assert flight.reached.count(1) == 3
 
 
+def test_a_jump_to_a_tag_leads_to_its_first_item() -> None:
+    tag, way = item("JUMP_TAG", p1=7.0), item("NAV_WAYPOINT", (5.0, 0.0, 5.0))
+    flight = Flight(tag, way, tag, item("DO_JUMP_TAG", p1=7.0, p2=1.0), item("NAV_LAND"), rules=COPTER_RULES)
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.reached == [0, 1, 2, 3, 0, 1, 2, 3, 4]
+
+
 def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
     """They hold, and the item that jumps is named once."""
     for items in (
