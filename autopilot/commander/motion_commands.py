@@ -93,9 +93,8 @@ class MotionCommands:
         if not isnan(command.z):
             up_m = self._height_of_takeoff(command)
         if not ground_m + MIN_CLIMB_M <= up_m < MAX_HEIGHT_M:
-            return denied(
-                "take-off", f"{up_m - ground_m:g} m above the ground is not within {MIN_CLIMB_M:g} to {MAX_HEIGHT_M:g}"
-            )
+            above = f"{round(up_m - ground_m, 3):g} m above the ground"
+            return denied("take-off", f"{above} is not within {MIN_CLIMB_M:g} to {MAX_HEIGHT_M:g}")
         context = pilot.context()
         x, y, _ = context.place
         refusal = self._fence.refusal((x, y, up_m))
@@ -163,7 +162,9 @@ class MotionCommands:
         radius = pilot.behaviour.orbit_radius_m if isnan(command.p1) else command.p1
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
-        circle = Orbit(center, radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
+        if yaw not in _YAW_BEHAVIOURS:
+            return denied("orbit", f"yaw behaviour {yaw:g} is not within 0 to {_YAW_BEHAVIOURS[-1]}")
+        circle = Orbit(center, radius, speed, int(yaw))
         refusal = self._no_circle(circle)
         if refusal is not None:
             return denied("orbit", refusal.reason)
@@ -173,13 +174,11 @@ class MotionCommands:
         return refusal
 
     def _no_circle(self, circle: Orbit) -> Refusal | None:
-        (x, y, z), radius, speed, yaw_behaviour = circle
+        (x, y, z), radius, speed, _ = circle
         if not MIN_RADIUS_M <= abs(radius) <= MAX_DISTANCE_M:
             return Refusal(f"radius {radius:g} is not within {MIN_RADIUS_M:g} to {MAX_DISTANCE_M:g} m")
         if speed is not None and self.speed_refused(speed):
             return Refusal(self.speed_refused(speed))
-        if yaw_behaviour not in _YAW_BEHAVIOURS:
-            return Refusal(f"yaw behaviour is not within 0 to {_YAW_BEHAVIOURS[-1]}")
         angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
         return self._home.refusal(z) or self.unreachable(*around)

@@ -79,22 +79,24 @@ def decode_local(
 ) -> PositionSetpoint:
     frame = frames.get(fields.coordinate_frame)
     if frame is None:
-        raise Refused("frame", f"frame {fields.coordinate_frame} is not local")
+        raise Refused("not local", f"frame {fields.coordinate_frame}")
     velocity, acceleration = _derivatives(fields, body=frame.body, up=frame.up)
     wire = (fields.x, fields.y, fields.z)
     place = group("position", wire, fields.type_mask >> _POSITION, MAX_DISTANCE_M, by_axis=True)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, here.yaw_rad if frame.turned_yaw else 0.5 * pi, up=frame.up)
     position = _position_from(place, frame, here)
-    return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us))
+    setpoint = PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us)
+    return _checked(setpoint, fields.type_mask)
 
 
 def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
     if fields.coordinate_frame not in GLOBAL_FRAMES:
-        raise Refused("frame", f"frame {fields.coordinate_frame} is not global")
+        raise Refused("not global", f"frame {fields.coordinate_frame}")
     velocity, acceleration = _derivatives(fields, body=False, up=False)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
     position = _position_of(fields, here)
-    return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, time_us=now_us))
+    setpoint = PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, time_us=now_us)
+    return _checked(setpoint, fields.type_mask)
 
 
 def decode_attitude(fields: Any, now_us: int) -> AttitudeSetpoint:
@@ -215,10 +217,10 @@ def _attitude(q: Any) -> Quaternion:
     return ned_frd_from_enu_flu((w / length, x / length, y / length, z / length))
 
 
-def _checked(setpoint: PositionSetpoint) -> PositionSetpoint:
+def _checked(setpoint: PositionSetpoint, mask: int) -> PositionSetpoint:
     position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, *_ = setpoint
     if all(map(isnan, (*position, *velocity, *acceleration, yaw_rad, yaw_rate_rad_s))):
-        raise Refused("empty", "nothing in it is given")
+        raise Refused("empty", f"type_mask {mask:#x}")
     return setpoint
 
 

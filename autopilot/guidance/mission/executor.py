@@ -144,7 +144,7 @@ class MissionExecutor:
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
         """Go to an item, -1 for the current one; `reset` resets the jumps, and pauses a complete mission."""
         if not self.items:
-            return Refusal("no mission", FAILED)
+            return Refusal(f"item {seq} refused: there is no mission", FAILED)
         seq = self.progress.seq if seq == -1 else seq
         if not 0 <= seq < len(self.items):
             return Refusal(f"mission: item {seq} is not within 0 to {len(self.items) - 1}", FAILED)

@@ -131,7 +131,7 @@ def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     for plan_type in (MISSION, FENCE, RALLY):
         cockpit.load(plan_type)
     assert cockpit.missions.changes == 3
-    assert cockpit.missions.executor.set_current(0, False) == Refusal("no mission", FAILED)
+    assert cockpit.missions.executor.set_current(0, False) == Refusal("item 0 refused: there is no mission", FAILED)
     cockpit.load(MISSION, *PLAN)
     assert cockpit.missions.executor.set_current(1, False) is None
     assert cockpit.missions.executor.progress.seq == 1

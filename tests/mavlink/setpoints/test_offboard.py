@@ -226,9 +226,9 @@ def test_nan_masks_axes_as_in_px4(offboard: Offboard, fields: dict[str, float], 
 @pytest.mark.parametrize(
     ("name", "fields", "reason"),
     [
-        (LOCAL, {"coordinate_frame": 2, "type_mask": 0x9F8}, "frame"),
-        (LOCAL, {"coordinate_frame": 255, "type_mask": 0x9F8}, "frame"),
-        (GLOBAL, {"coordinate_frame": 1, "type_mask": 0x9F8}, "frame"),
+        (LOCAL, {"coordinate_frame": 2, "type_mask": 0x9F8}, "not local"),
+        (LOCAL, {"coordinate_frame": 255, "type_mask": 0x9F8}, "not local"),
+        (GLOBAL, {"coordinate_frame": 1, "type_mask": 0x9F8}, "not global"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": 0x200 | ACCELERATION}, "force"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": 0xFFF}, "empty"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": POSITION, "x": nan, "y": nan, "z": nan}, "empty"),

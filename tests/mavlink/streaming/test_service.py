@@ -198,7 +198,6 @@ def test_a_provider_may_refuse() -> None:
         (520, ACCEPTED, "AUTOPILOT_VERSION"),
         (410, ACCEPTED, "HOME_POSITION"),
         (528, ACCEPTED, "FLIGHT_INFORMATION"),
-        (519, UNSUPPORTED, None),
         (525, UNSUPPORTED, None),
     ],
 )
@@ -238,7 +237,7 @@ def test_repeated_requests_do_not_delay_a_slow_stream() -> None:
 @settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(
     st.lists(
-        st.tuples(st.sampled_from([SET, GET, REQUEST, 520, 519]), MESSAGE_IDS, FLOATS, PEERS)
+        st.tuples(st.sampled_from([SET, GET, REQUEST, 520]), MESSAGE_IDS, FLOATS, PEERS)
         | st.tuples(st.integers(0, 255), st.integers(0, 65535), st.integers(0, 255), PEERS),
         max_size=30,
     )
