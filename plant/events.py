@@ -18,8 +18,7 @@ from colibri.mavlink.client.events import EventError, Mode, Setpoint, StationEve
 from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.faults import Equipment, Fault
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.plant.environment.weather import MAX_SPEED_M_S, RecordedWind, Wind
 from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle

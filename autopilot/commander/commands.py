@@ -19,9 +19,8 @@ from colibri.common.types import Vector
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import read_place
-from colibri.mavlink.wire.refusal import Refusal
 
 FORCE_MAGIC = 21196
 _OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
@@ -167,8 +166,7 @@ class Commands:
             return self._pilot.disarm(force=True)
         return denied("termination", f"{command.p1:g} is not 1; it is never undone")
 
-    def _check(self, command: ReceivedCommand) -> Refusal | None:
-        del command
+    def _check(self, _command: ReceivedCommand) -> Refusal | None:
         self._judge_fence()
         reasons = self._pilot.readiness.refusals()
         return Refusal("Preflight Fail: " + "; ".join(reasons), FAILED) if reasons else None

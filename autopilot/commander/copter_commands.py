@@ -16,8 +16,7 @@ from colibri.autopilot.guidance.tasks.guided import GuidedSettings
 from colibri.mavlink.parameters.store import ParamError
 from colibri.mavlink.services.command import DENIED, FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.services.statustext import CRITICAL, INFO
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 DO_SEND_BANNER = 42428  # of the dialect ardupilotmega
 _BY_THRUST, _YAW_STAYS, _WITHOUT_THROTTLE = 8, 0, 2
@@ -184,9 +183,8 @@ class CopterCommands(Commands):
     def _terminate(self, command: ReceivedCommand) -> Refusal | None:
         return super()._terminate(command) if command.p1 > 0.5 else Refusal("termination: 1 terminates", FAILED)
 
-    def _check(self, command: ReceivedCommand) -> Refusal | None:
+    def _check(self, _command: ReceivedCommand) -> Refusal | None:
         """Report each failed check; accepted also with failures."""
-        del command
         self._judge_fence()
         for reason in self._pilot.readiness.refusals():
             self._pilot.say(CRITICAL, f"PreArm: {reason}")
@@ -198,8 +196,7 @@ class CopterCommands(Commands):
         self._parameters.propose("FENCE_ENABLE", int(command.p1 == 1.0))
         return None
 
-    def _send_banner(self, command: ReceivedCommand) -> Refusal | None:
-        del command
+    def _send_banner(self, _command: ReceivedCommand) -> Refusal | None:
         for text in self._banner:
             self._pilot.say(INFO, text)
         return None

@@ -20,9 +20,8 @@ from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
 from colibri.mavlink.services.command import DENIED, FAILED, ReceivedCommand
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, PositionSetpoint
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import MAX_HEIGHT_M
-from colibri.mavlink.wire.refusal import Refusal
 
 GUIDED, GUIDED_NOGPS, LOITER, ALT_HOLD, POSHOLD, CIRCLE, AUTO = 4, 20, 5, 2, 16, 7, 3  # numbers of modes
 _ABOVE_HOME = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

@@ -12,8 +12,7 @@ from colibri.autopilot.guidance.mission.geofence import EDGE_M, OUTSIDE, AroundH
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.budget import Budget
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 CHECKED_AT_ONCE = 30_000  # pairs of a place and an edge that fit into the processor's cache
 _LOOK_EVERY_US = 100_000

@@ -2,8 +2,8 @@
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.mavlink.wire.dialect import Refusal
 from colibri.mavlink.wire.places import far
-from colibri.mavlink.wire.refusal import Refusal
 
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _OFF_M = 10.0

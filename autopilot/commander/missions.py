@@ -28,9 +28,8 @@ from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, StoredPlan
 from colibri.mavlink.services.statustext import INFO, WARNING
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import MAX_HEIGHT_M, far, too_far
-from colibri.mavlink.wire.refusal import Refusal
 
 _PLACE_US = 2.0  # work to find the place of an item
 _ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_NAV_VTOL_LAND, mav.MAV_CMD_DO_SET_HOME)

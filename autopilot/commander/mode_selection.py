@@ -7,7 +7,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode, State, first_missing
 from colibri.autopilot.commander.rules.shown_modes import ModeBook, ShownMode
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 
 THROTTLE_UP = 0.1  # of the stick's way; it starts a mission that waits
 

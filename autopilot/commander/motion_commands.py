@@ -15,9 +15,8 @@ from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import TEMPORARILY_REJECTED, Handler, ReceivedCommand
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import ABOVE_TERRAIN, MAX_DISTANCE_M, MAX_HEIGHT_M, far, height_m, read_place, too_far
-from colibri.mavlink.wire.refusal import Refusal
 
 MIN_CLIMB_M = 0.2  # a lower climb might not lift the feet
 MIN_RADIUS_M = 1.0

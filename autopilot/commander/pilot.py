@@ -32,7 +32,7 @@ from colibri.autopilot.guidance.tasks.task import (
 )
 from colibri.common.types import Vector
 from colibri.mavlink.services.statustext import INFO, WARNING
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 
 TaskFactory: TypeAlias = Callable[[Mode, TaskContext], FlightTask]
 _SAVED_BY = {

@@ -42,15 +42,15 @@ class Stages(Protocol):
     @property
     def mode(self) -> str: ...
 
-    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
+    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], /, *args: *Ts) -> T:
         """Return the result of `call`; after an exception raise, or return the result of `otherwise`."""
 
-    def receive(self, frame: Frame, plant_status: PlantStatus) -> None: ...
+    def receive(self, frame: Frame, plant_status: PlantStatus, /) -> None: ...
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
 
-    def wait(self, now_us: int) -> None: ...
+    def wait(self, now_us: int, /) -> None: ...
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
         """Receive a frame with a known state; `begins`: of a new flight."""
@@ -61,11 +61,11 @@ class Stages(Protocol):
     def supervise(self, now_us: int, state: VehicleState) -> None:
         """Execute the failsafe that is due at a control sample."""
 
-    def guide(self, now_us: int, state: VehicleState) -> Guidance: ...
+    def guide(self, now_us: int, state: VehicleState, /) -> Guidance: ...
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None: ...
 
-    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
+    def rescue(self, known: StateFrame, now_us: int, /) -> Decision | None:
         """Return a decision after an exception in the sample."""
 
     def actuate(self, now_us: int) -> ActuatorCommand: ...
@@ -75,7 +75,7 @@ class Stages(Protocol):
     def sampled(self, sample: ControlSample, duration_s: float) -> None:
         """Receive a completed control sample and its computation time."""
 
-    def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
+    def serve(self, inbox: Iterable[Received], /) -> "list[Outgoing]":
         """Do work without a deadline, and return the datagrams for ground stations."""
 
 

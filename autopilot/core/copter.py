@@ -7,7 +7,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.autopilot import Autopilot, ControlSample
 from colibri.autopilot.core.checkpoint import Checkpoint, Checkpointer, History, fingerprint_of
 from colibri.autopilot.core.defence import table
-from colibri.autopilot.core.defence.state_estimates import StateEstimates
+from colibri.autopilot.core.defence.inertial_estimate import StateEstimates
 from colibri.autopilot.core.flight_start import FlightStart
 from colibri.autopilot.core.flying import Flying
 from colibri.autopilot.core.parts import Parts, parts_of
@@ -16,7 +16,6 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.core.supervision import Supervision
 from colibri.autopilot.estimation.state_source import NewEstimator, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.guidance import Guidance
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import NOTHING, PlantBattery, PlantStatus
@@ -77,7 +76,9 @@ class Copter:
         self.defence.keep(lambda: None if self.time_us is None else checkpointer.record(self.time_us))
         self._estimates = StateEstimates(parts.state_source, self.defence, gravity_m_s2)
         self._supervision = Supervision(parts)
-        self._flying = Flying(parts)
+        self._flying = flying = Flying(parts)
+        self.estimate, self.guide, self.decide = self._estimates.state, flying.guide, flying.decide
+        self.rescue = flying.rescue
         self._start = FlightStart(parts, self._supervision, checkpointer, history, start_speed)
         self._reporter = Reporter(parts)
         self._sampled: tuple[ControlSample, Decision | None, float] | None = None
@@ -113,9 +114,6 @@ class Copter:
             self.loop.know_charge(battery.used_ah)
         self.parts.battery.receive(battery)
 
-    def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
-        return self._estimates.state(frame, now=now)
-
     def wait(self, now_us: int) -> None:
         """Deny commands before the first estimate; after a flight, prepare the next one."""
         self.waiting_us = now_us
@@ -139,16 +137,6 @@ class Copter:
         if self._estimates.blind:
             self._flying.go_blind()
         self._supervision.step(now_us, state)
-
-    def guide(self, now_us: int, state: VehicleState) -> Guidance:
-        del state
-        return self._flying.guide(now_us)
-
-    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        return self._flying.decide(now_us, state, guidance)
-
-    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
-        return self._flying.rescue(now_us, known)
 
     def actuate(self, now_us: int) -> ActuatorCommand:
         return ActuatorCommand(now_us, self.parts.actuation.send(now_us), armed=self._flying.armed)

@@ -30,7 +30,7 @@ class Flying:
             self._parts.defence.off.add(table.ROTOR_WATCH)
             self._parts.pilot.save(Action.DESCEND)
 
-    def rescue(self, now_us: int, known: StateFrame) -> Decision | None:
+    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
         """Fly the last resort after an exception in the sample itself."""
         self.descend(now_us)
         euler = euler_from_quaternion(known.attitude)
@@ -45,7 +45,7 @@ class Flying:
             actuation.descent = Descent(now_us, pilot.ground.height_m, standing=pilot.ground.standing)
             pilot.readiness.descends = True
 
-    def guide(self, now_us: int) -> Guidance:
+    def guide(self, now_us: int, _state: VehicleState) -> Guidance:
         """Return the pilot's references; after an exception in the task those of hold, then none."""
         pilot, self._now_us = self._parts.pilot, now_us
         if self._parts.actuation.descent is not None:

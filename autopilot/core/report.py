@@ -1,14 +1,13 @@
 """The report of a control sample: arming inputs to the pilot, the snapshot to ground stations."""
 
-from colibri.autopilot.commander.rules.arming import ArmingInputs, battery_fault
+from colibri.autopilot.commander.rules.arming import VOLTAGE_OF, ArmingInputs
 from colibri.autopilot.commander.rules.modes import MANUAL
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.core.autopilot import ControlSample
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.health import HealthWatch, not_known
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 _CRITICAL = (mav.MAV_BATTERY_CHARGE_STATE_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE_EMERGENCY)
 
@@ -65,4 +64,6 @@ class Reporter:
             return ""
         if charge_state in _CRITICAL:
             return f"battery critical: {voltage_v:.1f} V"
-        return battery_fault(voltage_v, model.empty_voltage_v, model.full_voltage_v)
+        minimum, maximum = VOLTAGE_OF
+        healthy = minimum * model.empty_voltage_v <= voltage_v <= maximum * model.full_voltage_v
+        return "" if healthy else f"battery unhealthy: {voltage_v:.1f} V"

@@ -72,12 +72,10 @@ class TrackStages:
         self._acts_us: int | None = None
         self._landing, self._ground_m = Landing(), 0.0
 
-    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        del part, otherwise
+    def guard(self, _part: str, call: Callable[[*Ts], T], _otherwise: Callable[[], T], *args: *Ts) -> T:
         return call(*args)
 
-    def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
-        del frame
+    def receive(self, _frame: Frame, plant_status: PlantStatus) -> None:
         if plant_status.battery is not None and plant_status.battery.exists:
             self.loop.know_charge(plant_status.battery.used_ah)
         if plant_status.delay_us is not None:
@@ -87,8 +85,7 @@ class TrackStages:
         self.state_source.receive(frame)
         return self.state_source.state() if now else self.state_source.last
 
-    def wait(self, now_us: int) -> None:
-        del now_us
+    def wait(self, _now_us: int) -> None:
         self.time_us = None
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
@@ -115,8 +112,7 @@ class TrackStages:
             state = state._replace(airborne=False)
         return self.loop.decide(now_us, state, guidance.horizon, guidance.pace)
 
-    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
-        del known, now_us
+    def rescue(self, _known: StateFrame, _now_us: int) -> Decision | None:
         return None
 
     def actuate(self, now_us: int) -> ActuatorCommand:
@@ -127,8 +123,7 @@ class TrackStages:
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None: ...
 
-    def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
-        del inbox
+    def serve(self, _inbox: Iterable[Received]) -> "list[Outgoing]":
         self.state_source.settle()
         if self._acts_us is not None:
             interval_us = self.loop.control_interval_us

@@ -5,8 +5,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, ReceivedCommand
-from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, Refusal
 
 ANSWERED_WITHIN_US = 1_000_000  # the result is normally in the frame after next
 
@@ -23,16 +22,13 @@ class Failures:
     def inject(self, command: ReceivedCommand, *, enabled: bool) -> Refusal | None:
         if not enabled:
             return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
-        if not self._relays:
-            return Refusal("failure refused: this simulator does not inject any", UNSUPPORTED)
         fault = fault_from(command.p1, command.p2, command.p3, (command.p4, command.x, command.y, command.z))
         if fault is None:
             return Refusal("failure refused: unit, type and instance must be whole numbers")
-        judgement = judged(fault, self._parts)
-        if isinstance(judgement, Refusal):
-            return Refusal(f"failure refused: {judgement.reason}", judgement.result)
-        self._to_send.append(judgement)
-        self._pending = (judgement, command)
+        refusal = self.request(fault)
+        if refusal is not None:
+            return Refusal(f"failure refused: {refusal.reason}", refusal.result)
+        self._pending = (fault, command)
         return PENDING
 
     def request(self, asked: Fault | WorldChange) -> Refusal | None:

@@ -257,8 +257,6 @@ class Stations:
             self.hub.send(self._text.say(severity, text))
 
     def take_texts(self) -> list[Line]:
-        if not self._said:
-            return []
         said = list(self._said)
         self._said.clear()
         return said

@@ -1,4 +1,4 @@
-"""Commands to the autopilot as a system."""
+"""Commands to the autopilot as a system, among them simulated calibrations."""
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version as version_of_package
@@ -6,18 +6,18 @@ from math import pi
 
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.ground.calibration import Calibration
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import Handler, ReceivedCommand
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.services.identity import Identity, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import misplaced, misplaced_height
-from colibri.mavlink.wire.refusal import Refusal
 
 VERSION = version_of_package("colibri-sitl")
 REBOOT, SHUT_DOWN = 1.0, 2.0
+_STEP_US = 100_000
+_STEPS = 10
 
 
 class SystemCommands:
@@ -88,3 +88,52 @@ class SystemCommands:
         shown = arguments[1:] if arguments[:1] == ["show"] else arguments
         names = [p.name for p in self._parameters if not shown or p.name.startswith(shown[0].upper().rstrip("*"))]
         return "".join(f"{name} {self._parameters[name]:g}\n" for name in names) or "no such parameter\n"
+
+
+class Calibration:
+    """Calibrates in appearance, with PX4's "[cal] ..." texts, which ground stations parse."""
+
+    def __init__(self) -> None:
+        self._kind = ""
+        self._step = 0
+        self._due_us = 0
+
+    def begin(self, command: ReceivedCommand, *, armed: bool) -> Refusal | None:
+        if armed:
+            return Refusal("calibration refused: the rotors are armed")
+        chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+        kind = _kind_of(chosen)
+        if kind is None:
+            return Refusal("calibration refused: only gyro, mag, accel and level are known", UNSUPPORTED)
+        if kind and self._kind:
+            return Refusal("calibration refused: another one is under way", TEMPORARILY_REJECTED)
+        if not kind:
+            cancelled, self._kind = self._kind, ""
+            self._step = -1 if cancelled else 0
+        else:
+            self._kind, self._step, self._due_us = kind, 0, command.now_us
+        return None
+
+    def poll(self, now_us: int) -> list[str]:
+        if self._step == -1:
+            self._step = 0
+            return ["[cal] calibration cancelled"]
+        if not self._kind or now_us < self._due_us:
+            return []
+        self._due_us = now_us + _STEP_US
+        step, self._step = self._step, self._step + 1
+        if step == 0:
+            return [f"[cal] calibration started: 2 {self._kind}"]
+        if step <= _STEPS:
+            return [f"[cal] progress <{100 * step // _STEPS}>"]
+        kind, self._kind, self._step = self._kind, "", 0
+        return [f"[cal] calibration done: {kind}"]
+
+
+def _kind_of(p: tuple[float, ...]) -> str | None:
+    given = [0.0 if value != value else value for value in p]  # nan: not given
+    chosen = [(place, value) for place, value in enumerate(given) if value != 0.0]
+    if not chosen:
+        return ""
+    known = {(0, 1.0): "gyro", (1, 1.0): "mag", (4, 1.0): "accel", (4, 2.0): "level"}
+    return known.get(chosen[0]) if len(chosen) == 1 else None

@@ -21,8 +21,7 @@ from colibri.mavlink.services.identity import ARDUPILOT as WIRE
 from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES
 from colibri.mavlink.streaming.rates import GCS, SDK, SILENT, Streams
 from colibri.mavlink.telemetry.copter import copter_telemetry
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 STABILIZE, ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, LAND, POSHOLD, BRAKE = 0, 2, 3, 4, 5, 6, 7, 9, 16, 17
 GUIDED_NOGPS, FOLLOW = 20, 23

@@ -45,33 +45,51 @@ _STREAMS = {
 """MAV_DATA_STREAM by the end of SR0_*."""
 
 
-class Greeter:
+class Polled:
+    """A service that receives no messages."""
+
+    handles = frozenset[str]()
+
+    def __init__(self, served: Served) -> None:
+        self._served = served
+
+    def receive(self, _message: Message, _peer: Peer, _now_us: int) -> Iterable[Send]:
+        return ()
+
+
+class Meeting(Polled):
+    """A service that knows of new channels."""
+
+    def __init__(self, served: Served) -> None:
+        super().__init__(served)
+        self._new: list[int] = []
+
+    def opened(self, channel: int, _now_us: int) -> None:
+        self._new.append(channel)
+
+    def closed(self, channel: int) -> None: ...
+
+
+class Greeter(Meeting):
     """Sends new clients the texts that tools wait for."""
 
     handles = _KNOWN_BY
 
     def __init__(self, served: Served) -> None:
-        self._served = served
+        super().__init__(served)
         self._met: set[Peer] = set()
-        self._new: list[int] = []
-
-    def opened(self, channel: int, now_us: int) -> None:
-        del now_us
-        self._new.append(channel)
 
     def closed(self, channel: int) -> None:
         self._met = {peer for peer in self._met if peer.channel != channel}
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del now_us
+    def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         texts = self._served.banner if message.name == "PARAM_REQUEST_LIST" else ()
         if peer not in self._met:
             self._met.add(peer)
             self._new.append(peer.channel)
         return [_text(text, peer.channel) for text in texts]
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
+    def poll(self, _now_us: int) -> Iterable[Send]:
         snapshot = self._served.snapshot
         if not self._new or snapshot is None or not snapshot.gps_ok:
             return ()
@@ -81,19 +99,6 @@ class Greeter:
 
 def _text(text: str, channel: int) -> Send:
     return Send("STATUSTEXT", (INFO, text.encode(), 0, 0), channel)
-
-
-class Polled:
-    """A service that receives no messages."""
-
-    handles = frozenset[str]()
-
-    def __init__(self, served: Served) -> None:
-        self._served = served
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, peer, now_us
-        return ()
 
 
 class Places(Polled):
@@ -107,8 +112,7 @@ class Places(Polled):
         pilot = self._served.pilot
         return (pilot.home.position_enu_m, pilot.home.origin, pilot.ground.times.flights)
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
+    def poll(self, _now_us: int) -> Iterable[Send]:
         place = self._place()
         if place == self._shown:
             return ()
@@ -124,32 +128,22 @@ class Requests:
     def __init__(self, served: Served) -> None:
         self._version = served.system.version
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del now_us
+    def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         if message.name == "TERRAIN_CHECK":
             return [to(peer, "TERRAIN_REPORT", message.fields.lat, message.fields.lon, 0, 0.0, 0.0, 0, 0)]
         return [to(peer, "AUTOPILOT_VERSION", *self._version)]
 
 
-class StreamRates:
+class StreamRates(Meeting):
     """Keeps requested rates in SR0_*, and streams by them on every channel."""
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
     def __init__(self, served: Served) -> None:
-        self._served = served
+        super().__init__(served)
         self._revision, self._rates = -1, dict.fromkeys(_STREAMS, 0)
-        self._new: list[int] = []
 
-    def opened(self, channel: int, now_us: int) -> None:
-        del now_us
-        self._new.append(channel)
-
-    def closed(self, channel: int) -> None:
-        """The schedule forgets the channel by itself."""
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del peer, now_us
+    def receive(self, message: Message, _peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
         rate = min(fields.req_message_rate, 50) if fields.start_stop else 0
         for name, number in _STREAMS.items():
@@ -202,8 +196,7 @@ class Switches(Polled):
         self._levels: dict[int, int] = {}
         self._stick, self._since_us = 0, 0
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del peer, now_us
+    def receive(self, message: Message, _peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
         if fields.command == DO_AUX_FUNCTION and fields.param2 in _LEVELS:
             self._act(int(fields.param1), int(fields.param2))
@@ -328,8 +321,7 @@ class SimulatedWorld(Polled):
         self._revision = served.parameters.revision
         self._flown = dict(_WORLD_AT_REST)
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
+    def poll(self, _now_us: int) -> Iterable[Send]:
         served = self._served
         if served.parameters.revision == self._revision or served.snapshot is None:
             return ()

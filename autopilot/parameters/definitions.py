@@ -12,11 +12,12 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.behaviour import behaviour, behaviour_parameters
 from colibri.autopilot.parameters.number_paths import changed, described, has, named, read
+from colibri.common.errors import unknown
 from colibri.mavlink.parameters.numbers import Number, read_numbers
-from colibri.mavlink.parameters.store import Parameter, Value
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, Value
 from colibri.plant.vehicle.description import MAX_ROTORS, Vehicle
 
-__all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
+__all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions", "with_parameters"]
 
 _FOLDER = Path(__file__).parent
 DESCRIBED = {"lpv-mpc": read_numbers(_FOLDER / "lpv_mpc.csv")}  # numbers by control law
@@ -27,6 +28,10 @@ _SPEED = "{speed}"  # placeholder for the unit of rotor speeds
 
 class ImpossibleError(AutopilotError):
     """Values that contradict each other; the message names the key."""
+
+
+class ChoiceError(AutopilotError):
+    """A parameter is unknown, has an invalid value, or needs a ground station."""
 
 
 def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
@@ -110,3 +115,27 @@ def _vehicle(tree: dict[str, Any]) -> Vehicle:
 def _default(number: Number, tree: Mapping[str, Any]) -> Value:
     value: Value = read(tree, number.path)
     return value if isinstance(value, int) else value / number.scale
+
+
+def with_parameters(
+    profile: Profile, vehicle: Vehicle, values: Mapping[str, Value], *, served: bool
+) -> tuple[Profile, Vehicle]:
+    """Return the profile and the autopilot's vehicle with these parameters, or raise ChoiceError or ImpossibleError."""
+    numbers = Numbers(profile, vehicle)
+    known = {each.name: each for each in definitions(profile, vehicle)}
+    for name, value in values.items():
+        if name not in known:
+            raise ChoiceError(unknown("parameter", name, known))
+        each = known[name]
+        whole = each.kind == ParamType.INT
+        if not each.minimum <= value <= each.maximum or (whole and value != int(value)):
+            kind = "a whole number" if whole else "a number"
+            raise ChoiceError(f"{name}: must be {kind} from {each.minimum:g} to {each.maximum:g}, not {value!r}")
+        if not served and name not in numbers.defaults:
+            raise ChoiceError(
+                f"{name}: acts with ground stations only: give --gcs, or fly colibri sitl or the fixture sitl"
+            )
+    parameters = Parameters([*known.values()])
+    whole_names = {name for name, each in known.items() if each.kind == ParamType.INT}
+    parameters.load({name: int(value) if name in whole_names else value for name, value in values.items()})
+    return numbers.applied(parameters.values)

@@ -31,7 +31,7 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
     try:
         profile, vehicle = spec.load()
         if spec.params and not spec.served:
-            from colibri.autopilot.parameters.chosen import with_parameters  # slow to load
+            from colibri.autopilot.parameters.definitions import with_parameters  # slow to load
 
             profile, vehicle = with_parameters(profile, vehicle, spec.params, served=False)
         ground = _ground(spec, profile, vehicle, status, stop) if spec.served else None

@@ -63,9 +63,8 @@ class SteppedLinks:
     def introduce(self, stations: Stations) -> None:
         """Channels open with their first message."""
 
-    def receive(self, stations: Stations) -> Iterable[Received]:
+    def receive(self, _stations: Stations) -> Iterable[Received]:
         """Wait for the messages of this instant; untaken ones remain."""
-        del stations
         step_message = self._conductor.receive()
         if step_message is not None:
             self._time_us = step_message.time_us
@@ -77,9 +76,8 @@ class SteppedLinks:
         mode, armed = self._state()
         self._conductor.send(StepMessage(self._time_us, parcels, custom_mode(mode), armed))
 
-    def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
+    def facts(self, _stations: Stations, _interval_s: float) -> list[dict[str, Any]]:
         """Empty: stepped flights have no terminal."""
-        del stations, interval_s
         return []
 
     def take_notes(self) -> list[str]:

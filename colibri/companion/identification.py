@@ -164,15 +164,8 @@ def draw(fit: Fit, path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-class Identified(NamedTuple):
-    """A response, the text of its file, and its fit."""
-
-    response: Response
-    text: str
-    fit: Fit
-
-
-def identified(companion: Companion) -> Identified:
+def identified(companion: Companion) -> tuple[Response, str, Fit]:
+    """Return the response, the text of its file, and its fit."""
     stack, steps = companion.peer.stack, companion.steps
     assert stack is not None, "it has flown"
     assert steps is not None, "it was an identification"
@@ -187,7 +180,7 @@ def identified(companion: Companion) -> Identified:
         f"Identified in flight on {stack.name}: a lag of order {found.order} of the body rates p, q, r.",
         f"It explains {explained} % of their variance. For colibri companion --response.",
     ]
-    return Identified(response, response_text(response, companion.thrust_scale, remarks), found)
+    return response, response_text(response, companion.thrust_scale, remarks), found
 
 
 def _of_second_order(response: Response, found: Fit) -> Response:

@@ -29,7 +29,7 @@ from colibri.companion.stack import STACKS, CompanionError, read_response
 from colibri.companion.steering.references import stay_of
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
-from colibri.companion.vehicle_peer import HomeSeeker, LocalOrigin, VehiclePeer
+from colibri.companion.vehicle_peer import LocalOrigin, VehiclePeer
 from colibri.flights.folder import occupied
 from colibri.mavlink.links.link import GroundLink, LinkError
 from colibri.mavlink.links.open import check_reach, open_ground_link
@@ -199,8 +199,8 @@ class _Wire:
 
 
 def _seek_home(wire: _Wire, peer: VehiclePeer, wait_s: float, stop: Stop) -> LocalOrigin:
-    seeker, began_s = HomeSeeker(peer), perf_counter()
-    while seeker.home is None:
+    now_s, began_s = 0.0, perf_counter()
+    while (home := peer.seek_home(round(now_s * 1e6))) is None:
         now_s = perf_counter() - began_s
         if stop:
             fail("ended by a signal before it flew", stop.code)
@@ -208,9 +208,9 @@ def _seek_home(wire: _Wire, peer: VehiclePeer, wait_s: float, stop: Stop) -> Loc
             raise CompanionError("a mission needs the vehicle's home position, which was not received")
         for datagram in wire.receive(peer, now_s):
             peer.receive(datagram, round(now_s * 1e6))
-        wire.send(seeker.poll(round(now_s * 1e6)))
+        wire.send(peer.poll(round(now_s * 1e6)))
         wire.link.wait(_POLL_S)
-    return seeker.home
+    return home
 
 
 def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_Log") -> None:

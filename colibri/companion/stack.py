@@ -207,8 +207,7 @@ _IDENTIFIED = Response((0.032, 0.032, 0.128), 0.010, 0.0, (4.0, 4.0, 2.0), (120.
 """Result of --identify, the same for any airframe."""
 
 
-def _colibri_thrust(parameters: Parameters, vehicle: Vehicle) -> MiddleHovers:
-    del parameters
+def _colibri_thrust(_parameters: Parameters, vehicle: Vehicle) -> MiddleHovers:
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     return MiddleHovers(max_load=float(vehicle.max_wrench()[0]) / weight_n)
 

@@ -22,6 +22,7 @@ _ENOUGH_OF_A_STREAM = 0.5
 _SECOND_US = 1_000_000
 _VERSION_TRIES = 4
 _VERSION_EVERY_US = 400_000
+_HOME_EVERY_US = 500_000
 _REMEMBERED_DELAYS = 50
 _COMMANDS = Repeat(every_us=300_000, tries=5)
 _PARAMETERS = Repeat(every_us=500_000, tries=4)
@@ -32,6 +33,20 @@ class ReceivedState(NamedTuple):
 
     at_us: int
     state: TimedState
+
+
+class LocalOrigin(NamedTuple):
+    """Origin of the local frame, and height of home in it."""
+
+    origin: Geodetic
+    up_m: float
+
+
+def local_origin(report: VehicleReport) -> LocalOrigin | None:
+    home, origin = report.home, report.origin
+    if home is None or origin is None:
+        return None
+    return LocalOrigin(origin, home.altitude_m - origin.altitude_m)
 
 
 class VehiclePeer:
@@ -50,7 +65,7 @@ class VehiclePeer:
         self._streams: list[Command] = []
         self._parameters: list[ReadParameter] | None = None
         self._states = StateAssembler()
-        self._renew_at_us = self._version_at_us = self._version_tries = 0
+        self._renew_at_us = self._version_at_us = self._version_tries = self._home_at_us = 0
         self._arrivals_us: deque[int] = deque()
         self._delays_us: deque[int] = deque(maxlen=_REMEMBERED_DELAYS)
 
@@ -154,8 +169,19 @@ class VehiclePeer:
         if self._version_tries > _VERSION_TRIES:
             self._meet(recognised(self.report.autopilot, b""))
         else:
-            number = float(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-            self.ask("version", mav.MAV_CMD_REQUEST_MESSAGE, number)
+            self._request("AUTOPILOT_VERSION")
+
+    def seek_home(self, now_us: int) -> LocalOrigin | None:
+        """Return home; until it is known, request HOME_POSITION and GPS_GLOBAL_ORIGIN."""
+        home = local_origin(self.report)
+        if home is None and self.system and now_us >= self._home_at_us:
+            self._home_at_us = now_us + _HOME_EVERY_US
+            self._request("HOME_POSITION")
+            self._request("GPS_GLOBAL_ORIGIN")
+        return home
+
+    def _request(self, name: str) -> None:
+        self.ask(name, mav.MAV_CMD_REQUEST_MESSAGE, float(getattr(mav, f"MAVLINK_MSG_ID_{name}")))
 
     def _meet(self, stack: Stack | None) -> None:
         if stack is None:
@@ -179,43 +205,6 @@ class VehiclePeer:
                 self.client.begin(set_message_interval(self.target, name, 1e6 / rate_hz, repeat=_COMMANDS))
                 for name, rate_hz in streams.items()
             ]
-
-
-_AGAIN_US = 500_000
-
-
-class LocalOrigin(NamedTuple):
-    """Origin of the local frame, and height of home in it."""
-
-    origin: Geodetic
-    up_m: float
-
-
-def local_origin(report: VehicleReport) -> LocalOrigin | None:
-    home, origin = report.home, report.origin
-    if home is None or origin is None:
-        return None
-    return LocalOrigin(origin, home.altitude_m - origin.altitude_m)
-
-
-class HomeSeeker:
-    """Requests HOME_POSITION and GPS_GLOBAL_ORIGIN until both are known."""
-
-    def __init__(self, peer: VehiclePeer) -> None:
-        self._peer = peer
-        self._again_us = 0
-
-    @property
-    def home(self) -> LocalOrigin | None:
-        return local_origin(self._peer.report)
-
-    def poll(self, now_us: int) -> list[bytes]:
-        if self._peer.system and now_us >= self._again_us:
-            self._again_us = now_us + _AGAIN_US
-            for name in ("HOME_POSITION", "GPS_GLOBAL_ORIGIN"):
-                number = float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
-                self._peer.ask(name, mav.MAV_CMD_REQUEST_MESSAGE, number)
-        return self._peer.poll(now_us)
 
 
 def moved_m(planned: LocalOrigin | None, report: VehicleReport) -> float:

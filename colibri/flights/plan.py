@@ -87,7 +87,7 @@ class FlightPlan:
             contents = Contents(profile, vehicle, whole.without(spec.without), file_text(spec.track), whole)
         profile, vehicle, plant_vehicle, track_file, _ = contents
         if spec.params:
-            from colibri.autopilot.parameters.chosen import with_parameters  # slow to load
+            from colibri.autopilot.parameters.definitions import with_parameters  # slow to load
 
             chosen = with_parameters(profile, vehicle, dict(spec.params), served=bool(spec.gcs))
             if not spec.gcs:

@@ -85,11 +85,7 @@ def _array(each: Any) -> Kept:
 
 def _generator(each: np.random.Generator) -> Kept:
     kept = each.bit_generator.state
-
-    def restore() -> None:
-        each.bit_generator.state = kept
-
-    return restore, ()
+    return lambda: setattr(each.bit_generator, "state", kept), ()
 
 
 def _random(each: Random) -> Kept:
@@ -102,11 +98,7 @@ def _cell(each: CellType) -> Kept:
         kept = each.cell_contents
     except ValueError:  # nothing is bound to the name yet
         return None, ()
-
-    def restore() -> None:
-        each.cell_contents = kept
-
-    return restore, (kept,)
+    return lambda: setattr(each, "cell_contents", kept), (kept,)
 
 
 def _function(each: FunctionType) -> Kept:

@@ -18,8 +18,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, behind
 from colibri.mavlink.parameters.store import Value
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble

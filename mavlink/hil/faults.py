@@ -10,8 +10,7 @@ from math import isfinite, isnan
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.errors import unknown
-from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED, Codec, mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED, Codec, Refusal, mav
 
 COMMAND: int = mav.MAV_CMD_INJECT_FAILURE
 GYROSCOPE: int = mav.FAILURE_UNIT_SENSOR_GYRO

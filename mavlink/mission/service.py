@@ -23,9 +23,8 @@ from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
 from colibri.mavlink.services.command import DEGREES, DENIED, GLOBAL_FRAMES, ReceivedCommand, command_name
 from colibri.mavlink.services.statustext import INFO, WARNING, StatusText
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import Message, Refusal, mav
 from colibri.mavlink.wire.places import misplaced, misplaced_height
-from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
 NO_MISSION_TOTAL = 0xFFFF  # MISSION_CURRENT.total without a mission

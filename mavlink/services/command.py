@@ -7,8 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.services.statustext import ERROR, INFO, WARNING, StatusText
-from colibri.mavlink.wire.dialect import Message, bits, mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Message, Refusal, bits, mav
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED

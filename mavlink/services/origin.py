@@ -7,9 +7,8 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.node.service import Peer, Send, to, to_all
 from colibri.mavlink.services.command import ACCEPTED
 from colibri.mavlink.services.statustext import WARNING, StatusText
-from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.wire.dialect import Message, Refusal
 from colibri.mavlink.wire.places import misplaced, misplaced_height
-from colibri.mavlink.wire.refusal import Refusal
 
 SET_MODE_ID = 11  # ArduPilot up to 4.5 acknowledges SET_MODE as this command
 

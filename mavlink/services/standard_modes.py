@@ -6,8 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import Fields, Send, to
 from colibri.mavlink.services.command import FAILED, Handler, ReceivedCommand
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 NAME_BYTES = 34  # of AVAILABLE_MODES.mode_name without its final zero
 

@@ -51,8 +51,6 @@ class StatusText:
         ]
 
     def take(self) -> list[Line]:
-        if not self._said:
-            return []
         said = list(self._said)
         self._said.clear()
         return said

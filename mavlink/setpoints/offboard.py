@@ -23,10 +23,9 @@ from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import HomePosition
-from colibri.mavlink.wire.dialect import Message, bits, mav
+from colibri.mavlink.wire.dialect import Message, Refusal, bits, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from colibri.mavlink.wire.places import ABOVE_SEA, MAX_DISTANCE_M, read_place
-from colibri.mavlink.wire.refusal import Refusal
 
 MAX_SPEED_M_S = 50.0
 MAX_ACCELERATION_M_S2 = 50.0

@@ -9,8 +9,7 @@ from colibri.mavlink.streaming.rates import GCS, PX4_STREAMS, SILENT, Streams
 from colibri.mavlink.streaming.schedule import Schedule
 from colibri.mavlink.telemetry.encoder import Encoder
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
-from colibri.mavlink.wire.dialect import Message, mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Message, Refusal, mav
 
 Provider: TypeAlias = Callable[[ReceivedCommand], list[Send] | Refusal]
 """Answers or refuses REQUEST_MESSAGE for another service's message, by the command's param2 to param6."""

@@ -154,21 +154,11 @@ COMMAND = Topic(
 )
 ROTORS = 4  # in `TRUTH` and `COMMAND`
 MORE_TRUTH = Topic(
-    *(
-        "colibri_more_truth",
-        107,
-        "more_rotors.csv",
-        "a frame of a vehicle with more than four rotors: the others, `nan` if missing",
-    ),
+    *("colibri_more_truth", 107, "more_rotors.csv", "a frame: rotors beyond the fourth, `nan` if missing"),
     columns=(Columns("omega5 omega6 omega7 omega8", "the vehicle's", "rotor speed"),),
 )
 MORE_COMMAND = Topic(
-    *(
-        "colibri_more_command",
-        108,
-        "more_commands.csv",
-        "a command of a vehicle with more than four rotors: the others, `nan` if missing",
-    ),
+    *("colibri_more_command", 108, "more_commands.csv", "a command: rotors beyond the fourth, `nan` if missing"),
     columns=(Columns("control5 control6 control7 control8", "", "rotor speeds relative to the largest", "float"),),
 )
 FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND, MORE_TRUTH, MORE_COMMAND)

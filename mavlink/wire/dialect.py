@@ -65,6 +65,13 @@ def bits(prefix: str, names: str) -> int:
     return sum(getattr(mav, prefix + name) for name in names.split())
 
 
+class Refusal(NamedTuple):
+    """A refusal of a request; the reason is empty if the result suffices."""
+
+    reason: str = ""
+    result: int = RESULT_DENIED  # MAV_RESULT
+
+
 class Message(NamedTuple):
     """A decoded message with a valid CRC; its values are unchecked."""
 

@@ -8,8 +8,7 @@ from math import hypot, isnan
 
 from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic, enu_of
 from colibri.common.types import Vector
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 MAX_DISTANCE_M = 100_000.0  # from the origin: a place beyond is refused
 FAR_M = 10_000.0  # from home: a place beyond is accepted with a warning, as in PX4 (MIS_DIST_1WP)

@@ -11,8 +11,7 @@ from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus, 
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PaceChange, PayloadChange, WindChange, WorldChange
-from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_UNSUPPORTED
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_UNSUPPORTED, Refusal
 from colibri.plant.environment.weather import RecordedWind, Wind
 from colibri.plant.events import Event, changes_of, check_events, equipment
 from colibri.plant.physics.integrators import Integrator

@@ -31,7 +31,7 @@ def main(program: str, folder: Path, name: str) -> None:
         if name == OWN_PHYSICS:
             steps = replace(settings, identifies=True, takeoff_height_m=HEIGHT_M)
             hovered = fly(bench, name, f"hover:height={HEIGHT_M}", steps)
-            settings = replace(settings, may_arm=False, response=identified(hovered).response)
+            settings = replace(settings, may_arm=False, response=identified(hovered)[0])
         companion = fly(bench, name, "spiral", settings)
     assert companion.ended is not None, "it was flown to its end"
     figures = {

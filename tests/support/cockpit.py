@@ -28,8 +28,7 @@ from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import ACCEPTED, ReceivedCommand
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.plant.vehicle.description import load_vehicle
 
 PREVIEW = Preview(20_000, 5)

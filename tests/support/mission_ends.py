@@ -9,8 +9,7 @@ from colibri.mavlink.mission.service import MissionProgress, MissionService, Mis
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.statustext import StatusText
-from colibri.mavlink.wire.dialect import Codec, Message, mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Codec, Message, Refusal, mav
 
 VEHICLE = (1, 1)
 FIRST = Peer(0, 255, 190)

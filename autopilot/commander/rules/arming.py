@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.rotations import tilt_deg
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 
 MAX_TILT_DEG = 45.0
 MAX_SPEED_M_S = 0.5
@@ -25,12 +25,6 @@ class ArmingInputs(NamedTuple):
     outside_fence: Refusal | None = None
     not_known: str = ""
     battery: str = ""
-
-
-def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
-    minimum, maximum = VOLTAGE_OF
-    healthy = minimum * empty_v <= voltage_v <= maximum * full_v
-    return "" if healthy else f"battery unhealthy: {voltage_v:.1f} V"
 
 
 def refusals(inputs: ArmingInputs) -> Iterator[str]:

@@ -119,8 +119,7 @@ def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> 
     return speed_m_s * sqrt(speed_m_s / jerk_m_s3)
 
 
-def _estimate_invalid(inputs: FailsafeInputs, limits: Limits) -> bool:
-    del limits
+def _estimate_invalid(inputs: FailsafeInputs, _limits: Limits) -> bool:
     if inputs.estimate is None:
         return False
     health = inputs.estimate.health

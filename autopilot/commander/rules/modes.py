@@ -4,8 +4,7 @@ from collections.abc import Collection, Mapping
 from enum import Enum, StrEnum
 from typing import NamedTuple
 
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 
 class Mode(StrEnum):

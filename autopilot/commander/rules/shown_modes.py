@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.modes import MANUAL, MODES, Mode, State, custom_mode, mode_of, mode_of_custom
 from colibri.mavlink.services.command import UNSUPPORTED
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 CUSTOM: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 STABILIZED: int = CUSTOM | mav.MAV_MODE_FLAG_STABILIZE_ENABLED

@@ -27,9 +27,9 @@ from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, Weigh
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
 from colibri.autopilot.control.lpv_mpc.planning import Now
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
-from colibri.autopilot.control.parts.error_dynamics import gains
 from colibri.autopilot.control.parts.level import levelled, seen_level
 from colibri.autopilot.control.parts.recovery import RecoverySettings
+from colibri.autopilot.control.parts.riccati import gains
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked

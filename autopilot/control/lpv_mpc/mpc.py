@@ -13,7 +13,6 @@ from colibri.autopilot.control.lpv_mpc.model import Lag, Model
 from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
 from colibri.autopilot.control.lpv_mpc.planning import QpKind, Workspace
 from colibri.autopilot.control.parts.riccati import lqr
-from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse, holds_yaw
@@ -23,6 +22,8 @@ from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
+
+_MAX_SLACK = 100.0
 
 
 class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -248,6 +249,15 @@ def model_of(vehicle: Vehicle, interval_s: float) -> Model:
         lag,
         interval_s,
     )
+
+
+def empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:
+    """Return the empty QP of a plan: planned variables, then slacks of soft limits."""
+    n = moved + slacks
+    H, f = np.zeros((n, n)), np.zeros(n)
+    H[moved:, moved:] = slack_weight * np.eye(slacks)
+    f[moved:] = slack_weight
+    return Qp(H, f, np.zeros((rows, n)), np.zeros(rows), np.zeros(n), np.full(n, _MAX_SLACK))
 
 
 def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:

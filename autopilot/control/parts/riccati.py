@@ -1,4 +1,4 @@
-"""The discrete-time LQR, by doubling of its Riccati equation: Chu, Fan, Lin and Wang, Int. J. Control 77(8), 2004."""
+"""Gains of a linear feedback: by placed poles, and by the discrete-time LQR."""
 
 import numpy as np
 
@@ -14,6 +14,7 @@ _RESIDUE = 1e-15  # converged if a doubling adds less than this part of the cost
 def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
     """Return cost S, (n, n), and gain K, (m, n), of u = -K x for x[k+1] = A x[k] + B u[k].
 
+    By doubling of the Riccati equation: Chu, Fan, Lin and Wang, Int. J. Control 77(8), 2004.
     Requires a stabilisable (A, B), a detectable (Q, A), symmetric Q, (n, n), and positive definite R, (m, m).
     """
     eye = np.eye(A.shape[0])
@@ -26,3 +27,9 @@ def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
             break
     weighted = matmul(B.T, S)
     return S, solve(R + matmul(weighted, B), matmul(weighted, A))
+
+
+def gains(poles: tuple[float, float]) -> tuple[float, float]:
+    """Return the gains on an error, 1/s², and on its rate, 1/s, for two poles, 1/s."""
+    first, second = poles
+    return first * second, -(first + second)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Decision, Horizon, Preview, VehicleState
-from colibri.autopilot.control.parts.error_dynamics import gains
+from colibri.autopilot.control.parts.riccati import gains
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.thesis.condensed_mpc import Solution, Weights, augment, condense, solve
 from colibri.autopilot.control.thesis.lpv_model import ATTITUDE_OUTPUT, Discretisation, attitude_model, discretise

@@ -13,8 +13,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.command import FAILED
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 
 NO_MISSION: int = mav.MISSION_STATE_NO_MISSION
 NOT_STARTED: int = mav.MISSION_STATE_NOT_STARTED

@@ -17,9 +17,8 @@ from colibri.common.types import Array, Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.mavlink.wire.places import MAX_DISTANCE_M
-from colibri.mavlink.wire.refusal import Refusal
 
 RETURN_POINT: int = mav.MAV_CMD_NAV_FENCE_RETURN_POINT
 POLYGONS: tuple[int, ...] = (

@@ -19,8 +19,7 @@ from colibri.mavlink.services.command import (
     UNSUPPORTED,
     ReceivedCommand,
 )
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from tests.support.cockpit import FLYING, GROUND, Cockpit, item
 
 FORCE = 21196.0

@@ -7,7 +7,7 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
 from colibri.mavlink.services.command import FAILED
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 from tests.support.cockpit import FLYING, Cockpit, item
 
 PLAN = (item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)), item("NAV_WAYPOINT", place=(5.0, 5.0, 10.0)))

@@ -10,8 +10,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import DENIED, FAILED, PENDING, UNSUPPORTED, ReceivedCommand
-from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED, Refusal
 
 PEER = Peer(0, 255, 190)
 
@@ -66,7 +65,7 @@ def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
     refusal = by_state.inject(asked(GPS, OFF), enabled=True)
     assert refusal == Refusal("failure refused: flown by the state, not by sensors", UNSUPPORTED)
     refusal = elsewhere.inject(asked(MOTOR, OFF), enabled=True)
-    assert refusal == Refusal("failure refused: this simulator does not inject any", UNSUPPORTED)
+    assert refusal == Refusal("failure refused: this simulator does not change", UNSUPPORTED)
     assert by_state.take() == elsewhere.take() == ()
 
 

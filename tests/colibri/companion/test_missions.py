@@ -15,7 +15,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.companion.plan_file import read_plan
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stack import CompanionError
-from colibri.companion.vehicle_peer import HomeSeeker, LocalOrigin, VehiclePeer
+from colibri.companion.vehicle_peer import LocalOrigin, VehiclePeer
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
@@ -121,17 +121,16 @@ def test_a_mission_is_flown_from_the_vehicles_home(tmp_path: Path) -> None:
     with Flights(Setting(), None) as flights:
         sitl = flights.begin(airborne=2.5)
         port, peer = Port(sitl), VehiclePeer()
-        seeker = HomeSeeker(peer)
-        while seeker.home is None:
+        while (home := peer.seek_home(sitl.time_us + AHEAD_US)) is None:
             assert sitl.time_s < 10.0
-            port.carry(seeker.poll(sitl.time_us + AHEAD_US))
+            port.carry(peer.poll(sitl.time_us + AHEAD_US))
             sitl.step()
             for datagram in port.take():
                 peer.receive(datagram, sitl.time_us + AHEAD_US)
         mission = read_plan(plan(tmp_path, [item(TAKE_OFF), *waypoints()], speed_m_s=4.0))
-        given = mission.waypoints(seeker.home)
+        given = mission.waypoints(home)
         assert given.points_enu_m == pytest.approx(np.array(PLACES), abs=0.03)
-        flown = track_through(given, load_vehicle("hummingbird"), load_profile("flight"), seeker.home.up_m).track
+        flown = track_through(given, load_vehicle("hummingbird"), load_profile("flight"), home.up_m).track
         ride = Ride(sitl, flown, CompanionSettings())
         ended = ride.to_the_end(40.0)
         assert ended.in_order, ended.why

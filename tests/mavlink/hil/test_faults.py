@@ -22,8 +22,7 @@ from colibri.mavlink.hil.faults import (
     judged,
 )
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery, decode_battery, encode_battery
-from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec, Refusal
 
 ALL_PARTS = list(Equipment)
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)

@@ -6,8 +6,7 @@ import pytest
 from colibri.mavlink.mission.items import ACCEPTED, MISSION
 from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.command import DENIED, ReceivedCommand
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from tests.support.mission_ends import FIRST, VEHICLE, Ground, fielded, results, some_item, upload
 
 

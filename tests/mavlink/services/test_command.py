@@ -23,8 +23,7 @@ from colibri.mavlink.services.command import (
     ReceivedCommand,
 )
 from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
-from colibri.mavlink.wire.dialect import Message, mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Message, Refusal, mav
 from tests.support.messages import (
     ANY_LONG,
     BYTES,

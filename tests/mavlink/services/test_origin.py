@@ -8,8 +8,7 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.statustext import StatusText
-from colibri.mavlink.wire.dialect import Message
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Message, Refusal
 from tests.support.messages import GROUND, message, on_the_wire
 
 Q = [1.0, 0.0, 0.0, 0.0]

@@ -6,7 +6,7 @@ from hypothesis import given
 from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.command import FAILED, ReceivedCommand
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 from tests.support.messages import FLOATS, GROUND, NAN, on_the_wire
 
 MODES = (

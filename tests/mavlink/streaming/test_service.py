@@ -10,8 +10,7 @@ from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJEC
 from colibri.mavlink.streaming.rates import DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from tests.support.messages import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
 from tests.support.snapshots import FLYING, TELEMETRY
 

@@ -9,7 +9,7 @@ from colibri.autopilot.commander.rules.arming import MAX_TILT_DEG, ArmingInputs,
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Quaternion, Vector
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 from tests.support.strategies import quaternions
 
 READY = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

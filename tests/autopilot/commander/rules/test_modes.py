@@ -21,7 +21,7 @@ from colibri.autopilot.commander.rules.modes import (
     mode_of_custom,
     next_state,
 )
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal
 
 
 def test_every_mode_has_one_row_and_one_number() -> None:

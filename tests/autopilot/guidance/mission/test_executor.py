@@ -21,8 +21,7 @@ from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Orbit, Return, T
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.services.command import FAILED
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from tests.support.mission_flight import HOME, ITEMS, STEP_US, Flight, begun, from_home, item
 
 MINUTE_S = 60.0

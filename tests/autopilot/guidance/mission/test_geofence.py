@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES, Discs, Geofence, Polygons
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.refusal import Refusal
+from colibri.mavlink.wire.dialect import Refusal, mav
 from tests.support.strategies import reals
 
 IN, OUT, DISC_IN, DISC_OUT, BACK = 5001, 5002, 5003, 5004, 5000
