@@ -1,6 +1,5 @@
-"""UDP ports for clients without I/O, and relays that damage the traffic."""
+"""UDP ports for clients without I/O, and relays."""
 
-import random
 import socket
 from abc import ABC, abstractmethod
 from select import select
@@ -27,31 +26,41 @@ class Talker(Protocol):
 
 
 class ServedSockets(ABC):
-    """Sockets that a thread serves within a block."""
+    """Sockets served in turns, or within a block by a thread."""
 
-    def __init__(self, *sockets: socket.socket) -> None:
-        self._sockets = sockets
+    sockets: tuple[socket.socket, ...]
+
+    def __init__(self) -> None:
         self._ended = Event()
-        self._thread = Thread(target=self._run, daemon=True)
 
     @abstractmethod
     def take(self, bound: socket.socket) -> None:
         """Read a datagram from a socket that has one."""
 
+    def close(self) -> None:
+        for bound in self.sockets:
+            bound.close()
+
     def __enter__(self) -> Self:
+        self._thread = Thread(target=self._run, daemon=True)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
-        for bound in self._sockets:
-            bound.close()
+        self.close()
 
     def _run(self) -> None:
         while not self._ended.is_set():
-            for bound in select(self._sockets, [], [], _LOOK_EVERY_S)[0]:
-                self.take(bound)
+            serve(self)
+
+
+def serve(*servers: ServedSockets) -> None:
+    """Wait for datagrams, at most 50 ms, and take one from each socket that has one."""
+    owners = {bound: server for server in servers for bound in server.sockets}
+    for bound in select(list(owners), [], [], _LOOK_EVERY_S)[0]:
+        owners[bound].take(bound)
 
 
 class OnPort(ServedSockets):
@@ -60,20 +69,18 @@ class OnPort(ServedSockets):
     def __init__(self, talker: Talker) -> None:
         self.sender: tuple[str, int] | None = None
         self._talker = talker
-        self._socket, self.url = bound_socket()
-        super().__init__(self._socket)
+        bound, self.url = bound_socket()
+        self.sockets = (bound,)
+        super().__init__()
 
     def send(self, datagram: bytes) -> None:
         assert self.sender is not None, "nothing has been received"
-        self._socket.sendto(datagram, self.sender)
+        self.sockets[0].sendto(datagram, self.sender)
 
     def take(self, bound: socket.socket) -> None:
         datagram, self.sender = bound.recvfrom(_MOST_BYTES)
         for answer in self._talker.receive(datagram, monotonic()):
             self.send(answer)
-
-
-LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1  # parts of the datagrams on a `BadLink`
 
 
 class Relay(ServedSockets):
@@ -82,10 +89,15 @@ class Relay(ServedSockets):
     def __init__(self, plant_url: str) -> None:
         _, host, port = plant_url.split(":")
         self._plant = (host, int(port))
+        self.open()
+        super().__init__()
+
+    def open(self) -> None:
+        """Open new sockets, for the next autopilot."""
         self._near, self.url = bound_socket()
         self._far, _ = bound_socket()
+        self.sockets = (self._near, self._far)
         self._autopilot: tuple[str, int] | None = None
-        super().__init__(self._near, self._far)
 
     @abstractmethod
     def pass_on(self, to: str, datagram: bytes) -> None:
@@ -102,29 +114,3 @@ class Relay(ServedSockets):
         if bound is self._near:
             self._autopilot = sender
         self.pass_on("plant" if bound is self._near else "autopilot", datagram)
-
-
-class BadLink(Relay):
-    """A relay like a bad radio link, both ways."""
-
-    def __init__(self, plant_url: str, seed: int) -> None:
-        super().__init__(plant_url)
-        self._chance = random.Random(seed)
-        self._held: dict[str, bytes] = {}
-        self.counts = {"passed": 0, "lost": 0, "duplicated": 0, "reordered": 0}
-
-    def pass_on(self, to: str, datagram: bytes) -> None:
-        fate = self._chance.random()
-        if fate < LOSS:
-            self.counts["lost"] += 1
-        elif fate < LOSS + REORDERING and to not in self._held:
-            self.counts["reordered"] += 1
-            self._held[to] = datagram
-        else:
-            self.counts["passed"] += 1
-            self.deliver(to, datagram)
-            if fate > 1.0 - DUPLICATION:
-                self.counts["duplicated"] += 1
-                self.deliver(to, datagram)
-            if to in self._held:
-                self.deliver(to, self._held.pop(to))

@@ -57,8 +57,7 @@ def _killing(
     processes = [start_plant(folder, "udpin:127.0.0.1:0", seed, out)]
     try:
         url = processes[0].wait_for("listening")["url"]
-        _, host, port = url.split(":")
-        between = Between((host, int(port)))
+        between = Between(url)
         yield processes, between, url
         between.close()
     finally:
@@ -190,7 +189,6 @@ def fly_plants(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple
                 between.fly_until(station, is_gone, "the words that the plant is gone")
             said = silences()[before:]
             station.begin_anew()
-            station.drain()
             processes.append(start_plant(folder, url, seed))
             between.fly_until(station, begins_anew, "the next plant's flight")
             done.append(PlantKill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False))

@@ -1,15 +1,32 @@
 """Flights on sensors: the same over every link, another with every seed, and on the track."""
 
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
 
 from colibri.common.process.lifecycle import nudge_m
-from tools.harness.ports import BadLink
+from colibri.sitl.backends.link_faults import Pipe, Trouble
+from tools.harness.ports import Relay
 from tools.harness.processes import Process, fly, running, start_autopilot, start_plant, states, topic_rows
 
 ON_SENSORS = ("spiral", "--feedback", "sensors")
+
+
+class BadLink(Relay):
+    """A relay like a bad radio link, both ways; what is held back goes with a later datagram."""
+
+    def __init__(self, plant_url: str) -> None:
+        super().__init__(plant_url)
+        trouble = Trouble(loss=0.2, duplicate=0.1, reorder=0.1)
+        self._pipes = {to: Pipe(trouble, to) for to in ("plant", "autopilot")}
+
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        now_us = round(monotonic() * 1e6)
+        self._pipes[to].put(datagram, now_us)
+        for each in self._pipes[to].due(now_us):
+            self.deliver(to, each)
 
 
 @pytest.mark.long
@@ -20,7 +37,7 @@ def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
     hummingbird = ("--vehicle", "hummingbird", "--integrator", "rk4", "--start", "y=-1,psi=90", "--seed", "3")
     (tmp_path / "logs").mkdir()
     plant, url = start_plant(tmp_path / "logs", tmp_path / "bad", *hummingbird, *duration)
-    with BadLink(url, seed=1) as relay:
+    with BadLink(url) as relay:
         autopilot = start_autopilot(
             tmp_path / "logs", relay.url, "--profile", "flight", "--track", "spiral", "--feedback", "sensors"
         )
