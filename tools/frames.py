@@ -12,13 +12,15 @@ from tempfile import TemporaryDirectory
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading, use_one_thread
+from colibri.mavlink.client.commands import padded
 from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
 from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from colibri.sitl.mission_items import on_wire, polygon, waypoint
 from tools.fuzz.messages import COMMANDS, Messages
 from tools.fuzz.vehicle import HIGH, BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
@@ -29,111 +31,104 @@ STATIONS = 32
 ITEMS, TRIANGLES = 900, 330
 FRAMES_BETWEEN = 30
 _LIST, _OPEN, _BURST, _CHECKSUM, _CREATE = 3, 4, 15, 14, 6
+_CODEC = Codec(255, 190)
 
 Request = Callable[[BareFlight], Iterator[list[bytes]]]
 """Yields the messages of each frame, at most 4 kB."""
 
 
-def item(command: int, east_m: float, north_m: float, up_m: float = 10.0, p1: float = 0.0) -> MissionItem:
-    place = geodetic_of((east_m, north_m, 0.0), DEFAULT_ORIGIN)
-    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
-    return MissionItem(mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, command, 1, p1, 0.0, 0.0, nan, x, y, up_m)
+def mission() -> list[MissionItem]:
+    return on_wire((waypoint(50.0 * cos(i), 50.0 * sin(i), 10.0) for i in range(ITEMS)), DEFAULT_ORIGIN)
 
 
-def mission(items: int = ITEMS) -> list[MissionItem]:
-    return [item(mav.MAV_CMD_NAV_WAYPOINT, 50.0 * cos(i), 50.0 * sin(i)) for i in range(items)]
-
-
-def fence(triangles: int = TRIANGLES) -> list[MissionItem]:
+def fence() -> list[MissionItem]:
     """Return exclusion triangles on a circle of 500 m."""
-    vertex = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
-    centers = [(500.0 * cos(2 * pi * i / triangles), 500.0 * sin(2 * pi * i / triangles)) for i in range(triangles)]
-    corners = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-    return [item(vertex, x + dx, y + dy, p1=3.0) for x, y in centers for dx, dy in corners]
+    angles = (2 * pi * i / TRIANGLES for i in range(TRIANGLES))
+    corners = ([(x, y), (x + 1.0, y), (x, y + 1.0)] for x, y in ((500.0 * cos(at), 500.0 * sin(at)) for at in angles))
+    return on_wire((item for triangle in corners for item in polygon(triangle, keep_out=True)), DEFAULT_ORIGIN)
 
 
-def load(flight: BareFlight, *, items: int = ITEMS, triangles: int = TRIANGLES) -> None:
-    flight.copter.stations.plans.load(FENCE, fence(triangles))
-    flight.copter.stations.plans.load(MISSION, mission(items))
+def load(flight: BareFlight) -> None:
+    flight.copter.stations.plans.load(FENCE, fence())
+    flight.copter.stations.plans.load(MISSION, mission())
 
 
-class Sender:
-    def __init__(self, flight: BareFlight) -> None:
-        self.flight, self._codec = flight, Codec(255, 190)
-
-    def __call__(self, name: str, *fields: object) -> bytes:
-        return self._codec.encode(name, *fields)
-
-    def command(self, number: int, *params: float) -> bytes:
-        return self("COMMAND_LONG", *TO, number, 0, *params, *(0.0,) * (7 - len(params)))
-
-    def sets(self, parameter: Parameter, share: float) -> bytes:
-        """Set a parameter off its default by a share, or to another value."""
-        default = parameter.default
-        value = default * (1.0 + share) if isinstance(default, float) else default + 1
-        value = min(max(value, parameter.minimum), parameter.maximum)
-        if parameter.kind == ParamType.INT:
-            value = int(value)
-        bits = Bits(bits_of(parameter.kind, value))
-        return self("PARAM_SET", *TO, parameter.name.encode(), bits, parameter.kind)
-
-    def file(self, opcode: int, path: bytes = b"/", *, session: int = 0, offset: int = 0) -> bytes:
-        payload = pack("<HBBBBBBI", 0, session, opcode, len(path), 0, 0, 0, offset) + path
-        return self("FILE_TRANSFER_PROTOCOL", 0, *TO, payload.ljust(251, b"\0"))
+def command(number: int, *params: float) -> bytes:
+    return _CODEC.encode("COMMAND_LONG", *TO, number, 0, *padded(params, 7))
 
 
-def _once(messages: Callable[[Sender], list[bytes]]) -> Request:
-    return lambda flight: iter([messages(Sender(flight))])
+def mode_command(mode: Mode) -> bytes:
+    number = custom_mode(mode)
+    return command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24)
+
+
+def sets(parameter: Parameter, share: float) -> bytes:
+    """Set a parameter off its default by a share, or to another value."""
+    default = parameter.default
+    value = default * (1.0 + share) if isinstance(default, float) else default + 1
+    value = min(max(value, parameter.minimum), parameter.maximum)
+    if parameter.kind == ParamType.INT:
+        value = int(value)
+    bits = Bits(bits_of(parameter.kind, value))
+    return _CODEC.encode("PARAM_SET", *TO, parameter.name.encode(), bits, parameter.kind)
+
+
+def file(opcode: int, path: bytes = b"/", *, session: int = 0) -> bytes:
+    payload = pack("<HBBBBBBI", 0, session, opcode, len(path), 0, 0, 0, 0) + path
+    return _CODEC.encode("FILE_TRANSFER_PROTOCOL", 0, *TO, payload.ljust(251, b"\0"))
+
+
+def _repeated(name: str, *fields: object, count: int) -> Request:
+    return lambda _flight: iter([[_CODEC.encode(name, *fields) for _ in range(count)]])
+
+
+def _planned(request: Request) -> Request:
+    def planned(flight: BareFlight) -> Iterator[list[bytes]]:
+        load(flight)
+        yield []
+        yield from request(flight)
+
+    return planned
+
+
+def _commands(number: int, *params: float, count: int = 80) -> Request:
+    varied = lambda i: command(number, *params[:-1], params[-1] + 1e-3 * i)  # noqa: E731
+    return _planned(lambda _flight: iter([[varied(i) for i in range(count)]]))
 
 
 def _parameters(*prefixes: str) -> Request:
     def request(flight: BareFlight) -> Iterator[list[bytes]]:
-        send = Sender(flight)
         chosen = [p for p in flight.copter.parameters if p.name.startswith(prefixes) and not p.read_only]
         for share in (0.001, 0.002):
-            yield [send.sets(chosen[i % len(chosen)], share * (1 + i // len(chosen))) for i in range(120)]
+            yield [sets(chosen[i % len(chosen)], share * (1 + i // len(chosen))) for i in range(120)]
 
     return request
 
 
 def _each_parameter(flight: BareFlight) -> Iterator[list[bytes]]:
-    send = Sender(flight)
     for parameter in flight.copter.parameters:
-        yield [send.sets(parameter, 0.001)]
+        yield [sets(parameter, 0.001)]
 
 
-def _commands(number: int, *params: float, count: int = 80, planned: bool = True) -> Request:
-    def request(flight: BareFlight) -> Iterator[list[bytes]]:
-        if planned:
-            load(flight)
-        send = Sender(flight)
-        yield []
-        yield [send.command(number, *params[:-1], params[-1] + 1e-3 * i) for i in range(count)]
-
-    return request
-
-
-def _upload(plan_type: int, items: list[MissionItem], first: Mapping[int, list[MissionItem]] = {}) -> Request:
+def _upload(plan_type: int, items: list[MissionItem], first: Mapping[int, list[MissionItem]]) -> Request:
     def request(flight: BareFlight) -> Iterator[list[bytes]]:
         for kind, plan in first.items():
             flight.copter.stations.plans.load(kind, plan)
-        send = Sender(flight)
-        yield [send("MISSION_COUNT", *TO, len(items), plan_type)]
+        yield [_CODEC.encode("MISSION_COUNT", *TO, len(items), plan_type)]
         for at in range(0, len(items), 60):
             whole = list(enumerate(items))[at : at + 60]
-            yield [send("MISSION_ITEM_INT", *TO, i, *each[:2], 0, *each[2:], plan_type) for i, each in whole]
+            yield [_CODEC.encode("MISSION_ITEM_INT", *TO, i, *each[:2], 0, *each[2:], plan_type) for i, each in whole]
 
     return request
 
 
 def _file_requests(opcode: int, path: bytes, count: int) -> Request:
-    return _once(lambda send: [send.file(opcode, path, session=i) for i in range(count)])
+    return lambda _flight: iter([[file(opcode, path, session=i) for i in range(count)]])
 
 
-def _bursts(flight: BareFlight) -> Iterator[list[bytes]]:
-    send = Sender(flight)
-    yield [send.file(_OPEN, b"/big", session=i) for i in range(8)]
-    yield [send.file(_BURST, session=i) for i in range(8)]
+def _bursts(_flight: BareFlight) -> Iterator[list[bytes]]:
+    yield [file(_OPEN, b"/big", session=i) for i in range(8)]
+    yield [file(_BURST, session=i) for i in range(8)]
 
 
 def _others(flight: BareFlight) -> list[HarnessClient]:
@@ -163,57 +158,34 @@ def _broadcast(flight: BareFlight) -> Iterator[list[bytes]]:
 
 def _forwarded(flight: BareFlight) -> Iterator[list[bytes]]:
     _others(flight)
-    send = Sender(flight)
-    yield [send("PING", 0, i, 0, 0) for i in range(120)]
+    yield [_CODEC.encode("PING", 0, i, 0, 0) for i in range(120)]
 
 
-def _repeated(name: str, *fields: object, count: int) -> Request:
-    return _once(lambda send: [send(name, *fields) for _ in range(count)])
-
-
-def _planned(name: str, *fields: object, count: int) -> Request:
-    def request(flight: BareFlight) -> Iterator[list[bytes]]:
-        load(flight)
-        yield []
-        yield from _repeated(name, *fields, count=count)(flight)
-
-    return request
-
-
-def _tracks(flight: BareFlight) -> Iterator[list[bytes]]:
-    number = custom_mode(Mode.TRACK)
-    send = Sender(flight)
+def _tracks(_flight: BareFlight) -> Iterator[list[bytes]]:
     for index, _ in enumerate(TRACKS):
-        yield [
-            send("PARAM_SET", *TO, b"TRACK", Bits(index), ParamType.INT),
-            send.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24),
-        ]
+        yield [_CODEC.encode("PARAM_SET", *TO, b"TRACK", Bits(index), ParamType.INT), mode_command(Mode.TRACK)]
         yield []
-        yield [send.command(mav.MAV_CMD_NAV_LOITER_UNLIM)]
+        yield [command(mav.MAV_CMD_NAV_LOITER_UNLIM)]
 
 
-def _modes(flight: BareFlight) -> Iterator[list[bytes]]:
-    send, modes = Sender(flight), [custom_mode(mode) for mode in (Mode.TRACK, Mode.HOLD)]
-    commands = [send.command(mav.MAV_CMD_DO_SET_MODE, 1.0, mode >> 16 & 0xFF, mode >> 24) for mode in modes]
-    yield commands * 40
+def _modes(_flight: BareFlight) -> Iterator[list[bytes]]:
+    yield [mode_command(mode) for mode in (Mode.TRACK, Mode.HOLD)] * 40
 
 
 def _reset(flight: BareFlight) -> Iterator[list[bytes]]:
-    send = Sender(flight)
     changed = [parameter for parameter in flight.copter.parameters if parameter.name.startswith(("LPV", "VEH", "MPC"))]
     for at in range(0, len(changed), 40):
-        yield [send.sets(parameter, 0.001) for parameter in changed[at : at + 40] if not parameter.read_only]
+        yield [sets(parameter, 0.001) for parameter in changed[at : at + 40] if not parameter.read_only]
     yield from [[]] * FRAMES_BETWEEN
     flight.copter.pilot.disarm(force=True)
-    yield [send.command(mav.MAV_CMD_PREFLIGHT_STORAGE, 2.0)]
+    yield [command(mav.MAV_CMD_PREFLIGHT_STORAGE, 2.0)]
 
 
 def _garbage(byte: bytes) -> Request:
     return lambda _flight: iter([[byte * 4096]] * 2)
 
 
-def _old_frames(flight: BareFlight) -> Iterator[list[bytes]]:
-    del flight
+def _old_frames(_flight: BareFlight) -> Iterator[list[bytes]]:
     sender = mav.MAVLink(None, srcSystem=255, srcComponent=190)
     heartbeat = mav.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(sender, force_mavlink1=True)
     yield [bytes(heartbeat)] * (4096 // len(heartbeat))
@@ -233,11 +205,11 @@ REQUESTS: Mapping[str, Request] = {
     "fence of 330 triangles": _upload(FENCE, fence(), {MISSION: mission()}),
     "80 orbits": _commands(mav.MAV_CMD_DO_ORBIT, 5.0, 2.0, 0.0, 0.0, nan, nan, nan),
     "80 new homes": _commands(mav.MAV_CMD_DO_SET_HOME, 1.0, 0.0),
-    "100 new origins": _planned("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473977420, 85455940, 488000, 0, count=100),
-    "80 plans cleared": _planned("MISSION_CLEAR_ALL", *TO, 255, count=80),
-    "100 fences cleared": _planned("MISSION_CLEAR_ALL", *TO, FENCE, count=100),
-    "120 mission items read": _planned("MISSION_REQUEST_INT", *TO, 5, 0, count=120),
-    "130 turns of the mission": _planned("MISSION_SET_CURRENT", *TO, 3, count=130),
+    "100 new origins": _planned(_repeated("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473977420, 85455940, 488000, 0, count=100)),
+    "80 plans cleared": _planned(_repeated("MISSION_CLEAR_ALL", *TO, 255, count=80)),
+    "100 fences cleared": _planned(_repeated("MISSION_CLEAR_ALL", *TO, FENCE, count=100)),
+    "120 mission items read": _planned(_repeated("MISSION_REQUEST_INT", *TO, 5, 0, count=120)),
+    "130 turns of the mission": _planned(_repeated("MISSION_SET_CURRENT", *TO, 3, count=130)),
     "15 listings of 1000 files": _file_requests(_LIST, b"/", 15),
     "15 checksums of 8 MB": _file_requests(_CHECKSUM, b"/big", 15),
     "15 packed parameter files": _file_requests(_OPEN, b"@PARAM/param.pck", 15),
@@ -248,7 +220,7 @@ REQUESTS: Mapping[str, Request] = {
     "15 listings of generated files": _file_requests(_LIST, b"/@PARAM", 15),
     "15 paths of 16 folders": _file_requests(_OPEN, b"/" + b"folder/" * 15 + b"file", 15),
     "15 logs of 8 MB": _repeated("LOG_REQUEST_DATA", *TO, 0, 0, 0xFFFFFFFF, count=120),
-    "120 downloads of the mission": _planned("MISSION_REQUEST_LIST", *TO, 0, count=120),
+    "120 downloads of the mission": _planned(_repeated("MISSION_REQUEST_LIST", *TO, 0, count=120)),
     "120 parameters read": _repeated("PARAM_REQUEST_READ", *TO, b"VEH_MASS", -1, count=120),
     "60 setpoints": _repeated(
         "SET_POSITION_TARGET_LOCAL_NED", 0, *TO, 1, 0xDF8, *(1.0, 0.0, -10.0), *(0.0,) * 8, count=60
@@ -266,8 +238,8 @@ REQUESTS: Mapping[str, Request] = {
     "120 times": _repeated("TIMESYNC", 0, 1, count=120),
     "50 lines of the shell": _repeated("SERIAL_CONTROL", 10, 6, 0, 0, 66, _SHELL.ljust(70, b"\0"), count=45),
     "32 stations at 250 Hz": _streams,
-    "200 groups of streams": _once(
-        lambda send: [send("REQUEST_DATA_STREAM", *TO, 0, 1 + i % 50, 1) for i in range(200)]
+    "200 groups of streams": lambda _flight: iter(
+        [[_CODEC.encode("REQUEST_DATA_STREAM", *TO, 0, 1 + i % 50, 1) for i in range(200)]]
     ),
     "120 pings to 32 stations": _forwarded,
     "120 requests of messages": _commands(

@@ -18,6 +18,7 @@ from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.parameters.definitions import definitions
+from colibri.common.process.arguments import seeds
 from colibri.common.process.lifecycle import loading, use_one_thread
 from colibri.common.types import Vector
 from colibri.mavlink.hil import faults
@@ -305,7 +306,7 @@ MAX_FRAME_MS = 20.0
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.random_flights", description=__doc__)
-    parser.add_argument("--seeds", type=_seeds, default=range(1, 501), metavar="A[-B]", help="default 1-500")
+    parser.add_argument("--seeds", type=seeds, default=seeds("1-500"), metavar="A[-B]", help="default 1-500")
     parser.add_argument("--verbose", action="store_true", help="print what happens in each flight")
     args = parser.parse_args()
     use_one_thread()
@@ -333,13 +334,6 @@ def _flown(case: RandomFlight) -> tuple[RandomFlightOutcome, float]:
         if max(frames_s, default=0.0) * 1e3 > MAX_FRAME_MS:
             frames_s = list(map(min, frames_s, fly(case).frames_s))
     return verdict, max(frames_s, default=0.0) * 1e3
-
-
-def _seeds(text: str) -> range:
-    first, dash, last = text.partition("-")
-    if not first.isdigit() or not (last.isdigit() if dash else not last) or int(last or first) < int(first):
-        raise argparse.ArgumentTypeError(f'seeds "{text}" are invalid: A, or A-B with A up to B')
-    return range(int(first), int(last or first) + 1)
 
 
 if __name__ == "__main__":

@@ -12,28 +12,16 @@ from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape, V
 _WAIT_S = 0.02
 
 
-class LiveVehicle:
-    """The vehicle at the other end of a link; its airframe is drawn by the number of rotors alone."""
+class ObservedVehicle:
+    """A vehicle by its messages; its airframe is drawn by the number of rotors alone."""
 
     is_live = True
+    span_s = (0.0, 0.0)
 
-    def __init__(self, url: str, name: str = "") -> None:
-        try:
-            self._link = open_ground_link(url)
-        except LinkError as error:
-            raise ViewError(str(error)) from error
-        self.url = self._link.url
-        self.name = name or self.url
-        self._observer = VehicleObserver()
+    def __init__(self, name: str, observer: VehicleObserver) -> None:
+        self.name = name
+        self._observer = observer
         self._lock = Lock()
-        self._ends = Event()
-        self._peers = [self._link.target] if self._link.target else []
-        self._thread = Thread(target=self._serve, daemon=True)
-        self._thread.start()
-
-    @property
-    def span_s(self) -> tuple[float, float]:
-        return 0.0, 0.0
 
     @property
     def surroundings(self) -> Surroundings:
@@ -63,6 +51,22 @@ class LiveVehicle:
         """Call a command of the observer: `live.order(Observer.land)`."""
         with self._lock:
             give(self._observer)
+
+
+class LiveVehicle(ObservedVehicle):
+    """The vehicle at the other end of a link."""
+
+    def __init__(self, url: str, name: str = "") -> None:
+        try:
+            self._link = open_ground_link(url)
+        except LinkError as error:
+            raise ViewError(str(error)) from error
+        self.url = self._link.url
+        super().__init__(name or self.url, VehicleObserver())
+        self._ends = Event()
+        self._peers = [self._link.target] if self._link.target else []
+        self._thread = Thread(target=self._serve, daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         self._ends.set()

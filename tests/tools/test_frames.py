@@ -18,7 +18,7 @@ from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.service import MAX_STREAMED
 from colibri.mavlink.wire.dialect import mav
-from tools.frames import REQUESTS, Sender, in_the_air
+from tools.frames import REQUESTS, in_the_air, sets
 from tools.fuzz.vehicle import BareFlight
 from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
@@ -134,7 +134,7 @@ def test_a_flood_does_not_lock_out_other_stations(flood: str) -> None:
     for frame in range(150):
         flight.client.send_raw(datagram)
         if frame == 60:
-            other.send_raw(Sender(flight).sets(parameter, 0.05))
+            other.send_raw(sets(parameter, 0.05))
             other.send("COMMAND_LONG", SYSTEM, COMPONENT, mav.MAV_CMD_REQUEST_MESSAGE, 0, 148, *(0.0,) * 6)
         flight.step()
         assert bool(other.acks) == (frame > 70) or 60 <= frame <= 70

@@ -21,14 +21,14 @@ from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, waypoint
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
-from colibri.view.live import LiveVehicle
+from colibri.view.live import LiveVehicle, ObservedVehicle
 from colibri.view.observer import CHOICES, VehicleObserver
 from colibri.view.page.page import Page
 from colibri.view.page.server import Token, serve
 from colibri.view.run import WAITS_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
-from tools.pages.pictures.watched import Watched
+from tools.pages.pictures.watched import watched
 
 FRAME_S, PLOTTED_AGAIN = 0.1, 8
 DRAWN_AFTER_MS = 15000  # without a GPU a picture takes seconds
@@ -69,7 +69,7 @@ def compared(path: Path) -> None:
 
 def live(path: Path) -> None:
     with begun(feedback="sensors", wind="4@300") as sitl:
-        vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
+        vehicle = ObservedVehicle("udpin:127.0.0.1:14550", watched(sitl))
         sitl.run(3.0)
         sitl.arm()
         sitl.takeoff(3.0)
@@ -80,7 +80,7 @@ def live(path: Path) -> None:
 
 def mission(path: Path) -> None:
     with begun(wind="3@200") as sitl:
-        vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
+        vehicle = ObservedVehicle("udpin:127.0.0.1:14550", watched(sitl))
         corners = [(-6.0, -6.0), (12.0, -6.0), (12.0, 10.0), (-6.0, 10.0)]
         sitl.upload_fence([*polygon(corners), *circle(2.0, (4.0, 3.0), keep_out=True)])
         sitl.upload_rally([Item(mav.MAV_CMD_NAV_RALLY_POINT, place=(-4.0, 7.0, 3.0))])

@@ -4,7 +4,6 @@ from colibri.mavlink.wire.dialect import Message
 from colibri.sitl.ground_station import Station
 from colibri.sitl.vehicle import Sitl
 from colibri.view.observer import COMPONENT, SYSTEM, VehicleObserver
-from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape
 
 
 class Watching(Station):
@@ -25,31 +24,3 @@ def watched(sitl: Sitl) -> VehicleObserver:
     assert isinstance(station, Watching)
     station.observer = VehicleObserver()
     return station.observer
-
-
-class Watched:
-    """A simulated flight as a live vehicle."""
-
-    is_live = True
-
-    def __init__(self, sitl: Sitl, name: str) -> None:
-        self.name = name
-        self._observer = watched(sitl)
-
-    @property
-    def span_s(self) -> tuple[float, float]:
-        return 0.0, 0.0
-
-    @property
-    def surroundings(self) -> Surroundings:
-        return self._observer.surroundings
-
-    @property
-    def airframe(self) -> VehicleShape:
-        return VehicleShape.of(self._observer.telemetry.rotors)
-
-    def at(self, time_s: float) -> Snapshot:
-        return self._observer.telemetry.snapshot(time_s)
-
-    def charts(self) -> tuple[Chart, ...]:
-        return self._observer.telemetry.charts()
