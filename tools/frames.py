@@ -92,8 +92,9 @@ def _planned(request: Request) -> Request:
 
 
 def _commands(number: int, *params: float, count: int = 80) -> Request:
-    varied = lambda i: command(number, *params[:-1], params[-1] + 1e-3 * i)  # noqa: E731
-    return _planned(lambda _flight: iter([[varied(i) for i in range(count)]]))
+    return _planned(
+        lambda _flight: iter([[command(number, *params[:-1], params[-1] + 1e-3 * i) for i in range(count)]])
+    )
 
 
 def _parameters(*prefixes: str) -> Request:
