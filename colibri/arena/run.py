@@ -86,13 +86,6 @@ class ArenaResults(CampaignResults):
         worst = np.nanmax(of_flights, axis=0, initial=0.0) * (_MM, _MM, _MM, 1.0, 1.0, 1.0)
         return Cell(len(places), int(away.sum()), *(round(float(value), 3) for value in worst))
 
-    def rows_by_law(self) -> list[dict[str, Any]]:
-        """Return plain data of each law and row; thrust in parts of what the rotors have."""
-        return [
-            {"law": law, **row._asdict(), "thrust": self._thrust[row], **cell._asdict()}
-            for (law, row), cell in self.cells.items()
-        ]
-
     def table(self) -> tuple[Cells, list[Cells]]:
         """Return mean errors, mm, a column for each law."""
         published = {
@@ -145,7 +138,10 @@ class ArenaResults(CampaignResults):
         (path / "flights.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
         if not self.flown:
             return path
-        rows = self.rows_by_law()
+        rows = [
+            {"law": law, **row._asdict(), "thrust": self._thrust[row], **cell._asdict()}
+            for (law, row), cell in self.cells.items()
+        ]
         sources = "".join(f"\n{each.law}: {each.source}.\n" for each in self.arena.set.published)
         text = f"{markdown(*self.table(), names=3)}\n{markdown(*self.law_table(), names=1)}{sources}"
         (path / "arena.md").write_text(text, encoding="utf-8")

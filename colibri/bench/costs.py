@@ -10,16 +10,15 @@ from pathlib import Path
 from struct import Struct
 from time import perf_counter
 from typing import Any, cast
-from unittest.mock import patch
 
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import copter_autopilot
-from colibri.autopilot.core.step import Received
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.bench.speed import TRACK, Report, plan_of, real_time_factor, sampled, summarised
-from colibri.bench.stages import Figures, summary
+from colibri.bench.stages import Figures, Stage, summary, timed
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import Stop, gc_frozen
 from colibri.common.process.status import Silent
@@ -33,7 +32,6 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.links.link import Endpoint
 from colibri.mavlink.links.udp import UdpLink
-from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.rates import GCS, SDK
 from colibri.mavlink.ulog.inputs import InputRecord, RecordKind
 from colibri.mavlink.ulog.reader import FILE, FlightFile
@@ -80,15 +78,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
         plan.spec.feedback, autopilot.frame_interval_us
     )
     times_us: list[float] = []
-    serve = autopilot.serve
-
-    def timed(inbox: Iterable[Received] = ()) -> list[Outgoing]:
-        began_s = perf_counter()
-        outbox = serve(inbox)
-        times_us.append((perf_counter() - began_s) * 1e6)
-        return outbox
-
-    with gc_frozen(), patch.object(autopilot, "serve", timed):
+    with gc_frozen(), timed(Stage("serve", Autopilot, "serve"), times_us):
         for _ in SteppedFlight(plant, autopilot, Direct()).samples(plan.spec.duration):
             pass
     sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)

@@ -97,7 +97,7 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageT
     with ExitStack() as stack:
         for stage in (*STAGES, *LINK_STAGES):
             keeper = keepers.get(stage.name, lambda *_: None)
-            stack.enter_context(_timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
+            stack.enter_context(timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
         fly_locally(plan, begun)
     return flight
 
@@ -174,12 +174,16 @@ def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
 
 
 @contextmanager
-def _timed(
-    stage: Stage, times_us: list[float], keep: Callable[..., object], flying: Callable[[], bool]
+def timed(
+    stage: Stage,
+    times_us: list[float],
+    keep: Callable[..., object] = lambda *_: None,
+    flying: Callable[[], bool] = lambda: True,
 ) -> Iterator[None]:
+    """Time a method within a block; `keep` gets its result and arguments, while `flying()`."""
     untimed = getattr(stage.owner, stage.method)
 
-    def timed(self: Any, *args: Any, **kwargs: Any) -> Any:
+    def timing(self: Any, *args: Any, **kwargs: Any) -> Any:
         began_s = perf_counter()
         result = untimed(self, *args, **kwargs)
         took_s = perf_counter() - began_s
@@ -189,7 +193,7 @@ def _timed(
                 times_us.append(took_s * 1e6)
         return result
 
-    setattr(stage.owner, stage.method, timed)
+    setattr(stage.owner, stage.method, timing)
     try:
         yield
     finally:

@@ -45,9 +45,6 @@ def campaign(
         tables: As in the file: `fly={"duration": 30}, grid={"track": ["spiral"]}, draw={...}, seeds="1-20"`, `metrics`,
             `logs`, `name`, `root_seed`, `paired`. Values may be objects, as in `colibri.fly`; metrics may be functions
             of a `Flight`.
-
-    Raises:
-        Error: An input is invalid.
     """
     checked("out", out, (str, PurePath, NoneType), "a folder", CampaignError)
     planned = campaign_of(tables_of(CampaignTables, file, tables))

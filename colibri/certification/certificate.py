@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
 from colibri.certification import lyapunov
-from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop, decrease, supply, whole
+from colibri.certification.attitude import AttitudeNumbers, attitude_loop
+from colibri.certification.loop import AnyArray, RangeError, UncertainLoop, decrease, supply, whole
 from colibri.certification.lyapunov import Proof
 from colibri.common.errors import Error
 from colibri.common.types import Array
@@ -95,19 +96,11 @@ class NotCertifiedError(Error):
     """A law without proof."""
 
 
-class CertifiedLaw(Protocol):
-    """A law with a loop at any scale of its ranges."""
-
-    def numbers_at(self, scale: float) -> Any: ...
-
-    def loop(self, numbers: Any, number: Number) -> UncertainLoop: ...
-
-
 class ProofEntry(NamedTuple):
     """A proof at a scale, with the loop's numbers and the margins."""
 
     scale: float
-    numbers: Any
+    numbers: AttitudeNumbers
     proof: Proof
     margins: dict[str, float]
 
@@ -122,15 +115,19 @@ class Certificate(NamedTuple):
     terminal: ProofEntry  # a terminal weight that keeps plans feasible and decreases their cost
 
 
-def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:
-    """Certify a law down to a scale of `least`; `NotCertifiedError` if a part is not proven."""
+def certify(numbers_at: Callable[[float], AttitudeNumbers], least: float, say: Callable[[str], None]) -> Certificate:
+    """Certify a law, by its numbers at a scale, down to `least`; `NotCertifiedError` if a part is not proven."""
+
+    def loop_at(scale: float) -> UncertainLoop:
+        return attitude_loop(numbers_at(scale), float)
+
     say("the largest ranges")
-    found = lyapunov.largest_scale(lambda scale: _loop_at(law, scale), least)
+    found = lyapunov.largest_scale(loop_at, least)
     if found is None:
-        raise NotCertifiedError(f"no Lyapunov function for {least:g} of the ranges: {_why(law, least)}")
+        raise NotCertifiedError(f"no Lyapunov function for {least:g} of the ranges: {_why(loop_at, least)}")
     scale = round(_WORKING_PART * found[0], _DIGITS)
     try:
-        loop = law.loop(law.numbers_at(scale), float)
+        loop = loop_at(scale)
     except RangeError as error:
         raise NotCertifiedError(f"no set within {scale:g} of the ranges: {error}") from None
     proofs = {"largest": found}
@@ -146,12 +143,12 @@ def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Cert
             raise NotCertifiedError(f"{what}: there is none within {scale:g} of the ranges, against this disturbance")
         proofs[name] = (scale, proof)
     say("exact arithmetic")
-    return Certificate(**{name: _checked(law, name, *each) for name, each in proofs.items()})
+    return Certificate(**{name: _checked(name, at, numbers_at(at), proof) for name, (at, proof) in proofs.items()})
 
 
-def margins_of(law: CertifiedLaw, name: str, numbers: Any, proof: Proof) -> dict[str, float]:
+def margins_of(name: str, numbers: AttitudeNumbers, proof: Proof) -> dict[str, float]:
     """Return the margins of the exact check, positive in a proof."""
-    loop = law.loop(numbers, exactly)
+    loop = attitude_loop(numbers, exactly)
     if name in ("largest", "decay", "terminal"):
         return {"decrease": decrease_margin(loop.undisturbed(), proof, weighted=name == "terminal")}
     margins = {"decrease": decrease_margin(loop, proof), "disturbance": supply_margin(loop, proof)}
@@ -166,25 +163,17 @@ def write(certificate: Certificate, about: dict[str, Any], path: Path) -> None:
     path.write_bytes(msgspec.json.format(msgspec.json.encode(entries, enc_hook=lambda array: array.tolist()), indent=1))
 
 
-def _checked(law: CertifiedLaw, name: str, scale: float, proof: Proof) -> ProofEntry:
-    numbers = law.numbers_at(scale)
-    margins = margins_of(law, name, numbers, proof)
+def _checked(name: str, scale: float, numbers: AttitudeNumbers, proof: Proof) -> ProofEntry:
+    margins = margins_of(name, numbers, proof)
     failed = [what for what, margin in margins.items() if not margin > 0.0]
     if failed:
         raise NotCertifiedError(f"{name}: found, but exact arithmetic does not confirm {' and '.join(failed)}")
     return ProofEntry(scale, numbers, proof, margins)
 
 
-def _loop_at(law: CertifiedLaw, scale: float) -> UncertainLoop | None:
+def _why(loop_at: Callable[[float], UncertainLoop], scale: float) -> str:
     try:
-        return law.loop(law.numbers_at(scale), float)
-    except RangeError:
-        return None
-
-
-def _why(law: CertifiedLaw, scale: float) -> str:
-    try:
-        radius = lyapunov.spectral_radius(law.loop(law.numbers_at(scale), float))
+        radius = lyapunov.spectral_radius(loop_at(scale))
     except RangeError as error:
         return str(error)
     if radius >= 1.0:

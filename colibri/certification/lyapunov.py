@@ -4,6 +4,7 @@ Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and C
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import combinations_with_replacement
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import solve_discrete_lyapunov
 
-from colibri.certification.loop import UncertainLoop, supply
+from colibri.certification.loop import RangeError, UncertainLoop, supply
 from colibri.common.types import Array
 
 _MAX_ROUNDS = 40
@@ -184,12 +185,13 @@ def spectral_radius(loop: UncertainLoop) -> float:
     return float(np.abs(np.linalg.eigvals(loop.vertices)).max())
 
 
-def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float) -> tuple[float, Proof] | None:
+def largest_scale(loop_at: Callable[[float], UncertainLoop], least: float) -> tuple[float, Proof] | None:
     """Find the largest scale of the ranges, by bisection."""
 
     def found_at(scale: float) -> Proof | None:
-        loop = loop_at(scale)
-        return contraction(loop, 1.0) if loop else None
+        with suppress(RangeError):
+            return contraction(loop_at(scale), 1.0)
+        return None
 
     return _bisected(least, 1.0, found_at)
 

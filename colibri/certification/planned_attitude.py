@@ -5,7 +5,7 @@ derivative at rest, level, in hover, is the certified gain; its dependence on at
 """
 
 from itertools import product
-from math import exp, pi, radians, sin, sqrt
+from math import exp, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,8 @@ from colibri.certification.attitude import (
     AttitudeNumbers,
     CertifiedConditions,
     Momentum,
-    attitude_loop,
 )
-from colibri.certification.certificate import ProofEntry
-from colibri.certification.loop import Number, RangeError, UncertainLoop
+from colibri.certification.loop import RangeError
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, quaternion_product
@@ -83,9 +81,6 @@ class PlannedAttitude:
         self.thrust_n = (self._min_squared * span_n, hover_n, self.max_squared * span_n)
         self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, hover_n).round(_GAIN_DIGITS)])
 
-    def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
-        return attitude_loop(numbers, number)
-
     def ranges(self, numbers: AttitudeNumbers) -> str:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
 
@@ -93,12 +88,6 @@ class PlannedAttitude:
         """Return the range of the thrust at a scale."""
         (low, hover, high), part = self.thrust_n, self.thrust_part * scale
         return hover - part * (hover - low), hover + part * (high - hover)
-
-    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> "PlanFlyer":
-        flights = len(held)
-        thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
-        headings = rng.uniform(-pi, pi, flights)
-        return PlanFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
         momentum = self._vehicle.momentum_along_z() * self._vehicle.rotors.max_speed
@@ -206,14 +195,6 @@ class PlanFlyer:
             phi, theta, psi = self._held[i]
             both[i], self._plans[i] = self._law.decide(z[i], (phi, theta, psi), thrust_n, self._plans[i])
         return both[:, 0], both[:, 1]
-
-    def turn(self, angles: Array, rates: Array) -> Array:
-        eta = np.sqrt(1.0 - 0.25 * np.sum(angles * angles, axis=1))
-        turned: Array = eta[:, None] * rates + 0.5 * np.cross(angles, rates)
-        return turned
-
-    def momentum(self) -> Momentum:
-        return self._law.momentum(self._thrusts_n)
 
 
 def _mirrored(rows: Array) -> Array:

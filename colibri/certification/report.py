@@ -1,8 +1,7 @@
 """`colibri certify`: certify a law, fly it, and report."""
 
 from argparse import Namespace
-from collections.abc import Callable
-from math import degrees, log
+from math import degrees, log, pi
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,7 +29,7 @@ from colibri.certification.attitude import (
 )
 from colibri.certification.certificate import Certificate, NotCertifiedError, ProofEntry
 from colibri.certification.loop import AnyArray
-from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
+from colibri.certification.planned_attitude import HELD_RAD, PlanFlyer, PlannedAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.common.types import Array
@@ -57,7 +56,6 @@ class Interval(NamedTuple):
     disturbance_n_m: Array
     inertia: Array
     lag_s: float
-    turn: Callable[[Array, Array], Array]
     momentum: Momentum
 
 
@@ -69,7 +67,8 @@ def fly(law: PlannedAttitude, entry: ProofEntry, flights: int, duration_s: float
     held = rng.uniform(-1.0, 1.0, (flights, 2)) * HELD_RAD
     constant, kinds = _directions(rng, flights, INPUTS), np.arange(flights)[:, None] % _KINDS
     inertia, gain = np.array(numbers.inertia_kg_m2), np.array(numbers.commanded[0])
-    flyer = law.flyer(entry, held, rng)
+    thrusts_n, headings = rng.uniform(*law.thrusts_n(entry.scale), flights), rng.uniform(-pi, pi, flights)
+    flyer, momentum = PlanFlyer(law, np.column_stack([held, headings]), thrusts_n), law.momentum(thrusts_n)
     states, beyond_n_m = [z], np.zeros(INPUTS)
     for step in range(round(duration_s / numbers.interval_s)):
         commands, remembered = flyer.commands(z)
@@ -79,7 +78,7 @@ def fly(law: PlannedAttitude, entry: ProofEntry, flights: int, duration_s: float
         disturbance_n_m = numbers.disturbance_n_m * np.choose(
             kinds, [constant, _directions(rng, flights, INPUTS), swinging, worst]
         )
-        interval = Interval(commands, disturbance_n_m, inertia, numbers.lag_s, flyer.turn, flyer.momentum())
+        interval = Interval(commands, disturbance_n_m, inertia, numbers.lag_s, momentum)
         z = np.hstack([integrate(z[:, :STATES], interval, numbers.interval_s), remembered])
         states.append(z)
     flown = np.array(states)
@@ -109,7 +108,8 @@ def _derivative(x: Array, interval: Interval) -> Array:
     carried[:, 2] += momentum
     turning = moment + interval.disturbance_n_m - np.cross(rate, carried)
     turning[:, 2] -= spinning
-    change[:, ANGLES] = interval.turn(x[:, ANGLES], rate)
+    eta = np.sqrt(1.0 - 0.25 * np.sum(x[:, ANGLES] ** 2, axis=1))
+    change[:, ANGLES] = eta[:, None] * rate + 0.5 * np.cross(x[:, ANGLES], rate)
     change[:, RATES] = turning / interval.inertia
     return change
 
@@ -197,10 +197,6 @@ _NOT_PROVEN = (
 )
 
 
-class UncertifiableError(Error):
-    """A profile whose law cannot be certified."""
-
-
 def certify(args: Namespace) -> int:
     with occupied(args.out):
         return _certify(args)
@@ -214,7 +210,7 @@ def _certify(args: Namespace) -> int:
     for stale in (CERTIFICATE, FIGURE):
         (args.out / stale).unlink(missing_ok=True)
     try:
-        found = certificates.certify(law, args.least, lambda what: None if args.quiet else _say(what))
+        found = certificates.certify(law.numbers_at, args.least, lambda what: None if args.quiet else _say(what))
     except NotCertifiedError as error:
         fail(f"{profile.where} on {vehicle.name}: refused: {error}", EXIT_FAILED)
     flown = fly(law, found.invariant, args.flights, _DURATION_S, seed=args.seed)
@@ -243,9 +239,9 @@ def _certify(args: Namespace) -> int:
 def law_of(profile: Profile, vehicle: Vehicle, conditions: CertifiedConditions) -> PlannedAttitude:
     name = profile.controller
     if name != LAW:
-        raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {LAW} can")
+        raise Error(f"{profile.where}: {name} cannot be certified: only {LAW} can")
     if not profile.table(name):
-        raise UncertifiableError(f"{profile.where}: has no numbers for {name}")
+        raise Error(f"{profile.where}: has no numbers for {name}")
     return PlannedAttitude(profile.table(name), vehicle, conditions)
 
 

@@ -30,10 +30,6 @@ HEADINGS = ("area", "tried", "result", "found")
 DURATION_S = 30.0
 
 
-class AreaError(Error):
-    """An unknown area."""
-
-
 @dataclass(frozen=True, slots=True)
 class Conformance:
     """Results of the checks of a control law."""
@@ -85,13 +81,10 @@ def check_controller(
         duration: Simulated time of each track, s.
         only: Areas to try; empty for all.
         progress: Called with each area before its trials.
-
-    Raises:
-        Error: An argument is invalid, or the law cannot be built.
     """
     for area in only:
         if area not in CHECKS:
-            raise AreaError(unknown("area", area, CHECKS))
+            raise Error(unknown("area", area, CHECKS))
     subject = Subject.of(controller, profile, vehicle, seed, duration)
     subject.build()
 

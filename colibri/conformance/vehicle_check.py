@@ -130,9 +130,6 @@ def check_vehicle(
         seed: Seed of turbulence and sensors.
         workers: Number of processes; by default one per core.
         quiet: Show no progress.
-
-    Raises:
-        Error: The file is invalid, or the control law refuses the vehicle.
     """
     return _Subject.of(vehicle, profile, controller, seed, workers).check(quiet=quiet)
 

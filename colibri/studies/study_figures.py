@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from colibri.analysis.figures import GRID, LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
 from colibri.analysis.logs import read_series
 from colibri.analysis.lost import LOST_M
+from colibri.analysis.outcome import fly_to_its_end
 from colibri.analysis.recording import ROTORS, SETTLED_AFTER_S, Recording, read_recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, Active, Fallback
 from colibri.campaigns.definition import Point
 from colibri.campaigns.flights import Common, plan_point
-from colibri.common.errors import InFlightError
 from colibri.common.types import Array
-from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.ulog.flight_topics import TRUTH
-from colibri.mavlink.ulog.log import MemoryLog
+from colibri.mavlink.ulog.log import TopicReader
 
 _AWAY_M = 200.0
 _GROUNDED_M = 0.1  # a vehicle on its back is lower than that
@@ -36,7 +35,7 @@ class Flown:
 
     recording: Recording
     rotor_limits: tuple[float, Array]
-    failure: str | None
+    failure: str  # reason of an early end
 
     @property
     def t(self) -> Array:
@@ -72,13 +71,13 @@ class Flown:
 
     @property
     def lost(self) -> bool:
-        return self.failure is not None or (not isnan(self.max_error_m) and self.max_error_m > LOST_M)
+        return bool(self.failure) or (not isnan(self.max_error_m) and self.max_error_m > LOST_M)
 
     @property
     def crashed(self) -> bool:
         """Whether it ended early, came down, or flew away."""
         came_down = float(self.recording["z"].min()) < _GROUNDED_M
-        return self.failure is not None or came_down or float(self.recording.position_error_m.max()) > _AWAY_M
+        return bool(self.failure) or came_down or float(self.recording.position_error_m.max()) > _AWAY_M
 
     @property
     def height_lost_m(self) -> float:
@@ -98,17 +97,13 @@ class Flown:
 def fly(common: Common, point: Point) -> Flown:
     """Fly in memory, also a flight that ends early."""
     plan = plan_point(common, point)
-    log, failure = MemoryLog(), None
-    try:
-        fly_locally(plan, topics=log)
-    except InFlightError as error:
-        failure = str(error)
-    recording = read_recording(plan, log)
-    limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, log, recording["t"]))
-    return Flown(recording, limits, failure)
+    outcome = fly_to_its_end(plan)
+    recording = read_recording(plan, outcome.log)
+    limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, outcome.log, recording["t"]))
+    return Flown(recording, limits, outcome.failure)
 
 
-def _top_speed(plan: FlightPlan, log: MemoryLog, t: Array) -> Array:
+def _top_speed(plan: FlightPlan, log: TopicReader, t: Array) -> Array:
     vehicle = plan.plant_vehicle
     if vehicle.battery is None:
         return np.full_like(t, vehicle.rotors.max_speed)
@@ -262,11 +257,13 @@ def _recovery(result: StudyResult) -> Figure:
     shown = flown.t <= RECOVERY_SHOWN_S
     t = flown.t[shown]
     height, tilt, rates, rotors = (axes for (axes,) in grid)
-    _series(height, t, [("", flown.recording["z"][shown])])
-    _series(tilt, t, [("", flown.tilt_deg[shown])])
-    _series(rates, t, [(name, flown.recording[name][shown]) for name in "pqr"])
+    height.plot(t, flown.recording["z"][shown], **line_style(Style(_FOUR[0], 1.6)))
+    tilt.plot(t, flown.tilt_deg[shown], **line_style(Style(_FOUR[0], 1.6)))
+    for name, color in zip("pqr", _FOUR, strict=False):
+        rates.plot(t, flown.recording[name][shown], label=name, **line_style(Style(color, 1.6)))
     _rotors(rotors, flown, shown)
-    for axes, quantity in zip((height, tilt, rates, rotors), _RECOVERY_QUANTITIES, strict=True):
+    quantities = ("height (m)", "tilt (°)", "rates (rad/s)", "Ω (rad/s)")
+    for (axes,), quantity in zip(grid, quantities, strict=True):
         for begin_s, end_s in _spans(flown.t[:-1], flown.decided_by(Fallback.RECOVERY)):
             axes.axvspan(begin_s, min(end_s, RECOVERY_SHOWN_S), color=_SHADE, linewidth=0.0, label="recovery law flies")
         _dress(axes, quantity)
@@ -279,7 +276,6 @@ def _recovery(result: StudyResult) -> Figure:
 
 
 _MIN_HEIGHTS_M = 0.02  # closer ticks would need more digits than there is room for
-_RECOVERY_QUANTITIES = ("height (m)", "tilt (°)", "rates (rad/s)", "Ω (rad/s)")
 
 
 def _limits(result: StudyResult) -> Figure:
@@ -322,11 +318,6 @@ def _rotors(axes: Axes, flown: Flown, shown: Any) -> None:
 _KINDS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 """Colours of active constraints, in their order."""
 _FOUR = ("#000000", "#E69F00", "#0072B2", "#009E73")
-
-
-def _series(axes: Axes, t: Array, curves: Iterable[tuple[str, Array]]) -> None:
-    for number, (label, values) in enumerate(curves):
-        axes.plot(t, values, label=label or None, **line_style(Style(_FOUR[(0, 1, 2)[number]], 1.6)))
 
 
 def _dress(axes: Axes, quantity: str) -> None:

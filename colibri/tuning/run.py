@@ -172,9 +172,6 @@ def tune(
         tables: As in the file: `tune={"controllers.LAW.KEY": {"uniform": [2, 20]}}, objectives={"rmse_m": "mean"},
             fly={...}, grid={...}, draw={...}, seeds="1-8", check_seeds="101-150"`, `trials`, `prune_after`, `metrics`,
             `name`, `root_seed`. Values may be objects, as in `colibri.fly`; metrics may be functions of a `Flight`.
-
-    Raises:
-        Error: An input is invalid.
     """
     require_optuna()
     tuning = tuning_of(tables_of(TuningTables, file, tables))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -139,14 +140,13 @@ _GRACE_S = 10.0
 _COMPILES_HOURS = 0.05  # the first start after a change compiles
 
 
+@dataclass(frozen=True, slots=True)
 class SitlProcess:
-    def __init__(
-        self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path, printed: Path
-    ) -> None:
-        self.process = process
-        self.seen = seen
-        self.state = state
-        self._said, self._printed = said, printed
+    process: subprocess.Popen[bytes]
+    seen: Observer
+    state: Path
+    _said: Path
+    _printed: Path
 
     @property
     def ports(self) -> list[int]:

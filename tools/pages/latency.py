@@ -3,20 +3,18 @@
 from collections.abc import Iterator, Sequence
 from math import pi
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from colibri.analysis.estimation import rms
 from colibri.analysis.figures import GRID
+from colibri.analysis.outcome import fly_to_its_end
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
 from colibri.campaigns.engines import in_order
-from colibri.common.errors import InFlightError
-from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
-from colibri.mavlink.ulog.log import MemoryLog
 from tools.pages.tables import with_tables
 
 LAWS = ("lpv-mpc", "geometric-se3")
@@ -82,21 +80,11 @@ def merit(recording: Recording, case: LatencyCase) -> float | None:
 
 def fly(flight: LatencyFlight) -> float | None:
     law, case, round_trip_ms, told = flight
-    spec = FlightSpec.of(
-        case.track,
-        controller=law,
-        link="direct",
-        latency=0.5 * round_trip_ms,
-        delay=told,
-        start=case.start,
-        duration=case.duration_s,
-    )
-    plan, log = FlightPlan.of(spec), MemoryLog()
-    try:
-        fly_locally(plan, topics=log)
-        return merit(read_recording(plan, log), case)
-    except InFlightError:
-        return None
+    link: dict[str, Any] = {"link": "direct", "latency": 0.5 * round_trip_ms, "delay": told}
+    spec = FlightSpec.of(case.track, controller=law, **link, start=case.start, duration=case.duration_s)
+    plan = FlightPlan.of(spec)
+    outcome = fly_to_its_end(plan)
+    return None if outcome.error else merit(read_recording(plan, outcome.log), case)
 
 
 def sweep(round_trips_ms: Sequence[float]) -> list[SweepPoint]:

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions, box_of
-from colibri.certification.certificate import ProofEntry, exactly
+from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions, attitude_loop, box_of
+from colibri.certification.certificate import exactly
 from colibri.certification.loop import RangeError, UncertainLoop
-from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.certification.report import Interval, integrate
 from colibri.common.types import Array
@@ -20,7 +19,6 @@ PROFILE, VEHICLE, CONDITIONS = load_profile("flight"), load_vehicle("hummingbird
 LAW = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
 INERTIA = [0.003, 0.004, 0.006]
 UNEQUAL = LAW.numbers_at(0.5)._replace(inertia_kg_m2=INERTIA)
-NOTHING = Proof(np.eye(12), np.ones(1), np.ones(1), 1.0)
 MARGIN = 1.0 + 1e-9
 
 
@@ -46,7 +44,7 @@ def test_the_error_hull_covers_the_error_box() -> None:
 
 @pytest.mark.parametrize("numbers", [LAW.numbers_at(0.5), UNEQUAL], ids=["as it is", "unequal"])
 def test_what_the_plant_does_in_an_interval_lies_within_the_loop(numbers: AttitudeNumbers) -> None:
-    loop, rng, flights = LAW.loop(numbers, float), np.random.default_rng(2), 400
+    loop, rng, flights = attitude_loop(numbers, float), np.random.default_rng(2), 400
     z, interval = somewhere(numbers, rng, flights)
     remembered = z @ np.array(numbers.commanded[1]).T
     after = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), remembered])
@@ -56,7 +54,6 @@ def test_what_the_plant_does_in_an_interval_lies_within_the_loop(numbers: Attitu
 
 def somewhere(numbers: AttitudeNumbers, rng: np.random.Generator, flights: int) -> tuple[Array, Interval]:
     rates = np.array(numbers.rates_rad_s)
-    held = np.zeros((flights, 2))
     z = np.zeros((flights, 12))
     z[:, [0, 2, 4]] = rng.uniform(-0.8, 0.8, (flights, 3)) * numbers.angles[:3]
     z[:, [1, 3, 5]] = rng.uniform(-0.8, 0.8, (flights, 3)) * rates
@@ -64,9 +61,8 @@ def somewhere(numbers: AttitudeNumbers, rng: np.random.Generator, flights: int) 
     disturbance = rng.normal(size=(flights, 3))
     disturbance *= numbers.disturbance_n_m / np.linalg.norm(disturbance, axis=1)[:, None]
     commands = z @ np.array(numbers.commanded[0]).T
-    flyer = LAW.flyer(ProofEntry(0.5, numbers, NOTHING, {}), held, rng)
-    inertia = np.array(numbers.inertia_kg_m2)
-    return z, Interval(commands, disturbance, inertia, numbers.lag_s, flyer.turn, flyer.momentum())
+    momentum = LAW.momentum(rng.uniform(*LAW.thrusts_n(0.5), flights))
+    return z, Interval(commands, disturbance, np.array(numbers.inertia_kg_m2), numbers.lag_s, momentum)
 
 
 def supports(loop: UncertainLoop, z: Array, sides: Array) -> Array:
@@ -80,38 +76,38 @@ def supports(loop: UncertainLoop, z: Array, sides: Array) -> Array:
 
 
 def test_fractions_and_floats_make_the_same_loop() -> None:
-    floats, fractions = LAW.loop(UNEQUAL, float), LAW.loop(UNEQUAL, exactly)
+    floats, fractions = attitude_loop(UNEQUAL, float), attitude_loop(UNEQUAL, exactly)
     for one, other in zip(floats, fractions, strict=True):
         assert np.asarray(other, dtype=float) == pytest.approx(one, rel=1e-12, abs=1e-15)
     assert isinstance(fractions.vertices[0, 0, 0], Fraction)
 
 
 def test_symmetry_leaves_a_quarter_of_the_vertices() -> None:
-    loop = LAW.loop(UNEQUAL, float)
+    loop = attitude_loop(UNEQUAL, float)
     assert len(loop.vertices) == 4 * len(loop.distinct().vertices) == 128
     assert loop.blocks() == [[0, 1, 6, 9], [2, 3, 7, 10], [4, 5, 8, 11]]
 
 
 def test_the_moments_follow_as_their_lag_has_it() -> None:
     numbers = LAW.numbers_at(0.3)
-    A = LAW.loop(numbers, float).vertices[0]
+    A = attitude_loop(numbers, float).vertices[0]
     assert numbers.stays == pytest.approx(exp(-0.008 / 0.025))
     assert A[6, 6] == pytest.approx(numbers.stays + (1.0 - numbers.stays) * numbers.commanded[0][0][6])
 
 
 def test_ranges_that_an_interval_leaves_are_refused() -> None:
     with pytest.raises(RangeError, match="within one control interval"):
-        LAW.loop(LAW.numbers_at(0.3)._replace(interval_s=0.1), float)
+        attitude_loop(LAW.numbers_at(0.3)._replace(interval_s=0.1), float)
     with pytest.raises(RangeError, match="no moments remain"):
-        LAW.loop(LAW.numbers_at(0.3)._replace(headroom=0.0), float)
+        attitude_loop(LAW.numbers_at(0.3)._replace(headroom=0.0), float)
 
 
 def test_errors_and_gains_that_cannot_be_bounded_are_refused() -> None:
     numbers = LAW.numbers_at(0.3)
     with pytest.raises(RangeError, match="too large together"):
-        LAW.loop(numbers._replace(angles=[1.2, 1.2, 1.2, 0.1]), float)
+        attitude_loop(numbers._replace(angles=[1.2, 1.2, 1.2, 0.1]), float)
     with pytest.raises(RangeError, match="exceed the rotors"):
-        LAW.loop(numbers._replace(unsure=np.ones((2, 3, 12)).tolist()), float)
+        attitude_loop(numbers._replace(unsure=np.ones((2, 3, 12)).tolist()), float)
 
 
 def test_the_gain_is_that_of_the_laws_own_steps() -> None:

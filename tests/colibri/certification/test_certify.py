@@ -12,7 +12,7 @@ from colibri.certification import certificate as certificates
 from colibri.certification.attitude import CertifiedConditions
 from colibri.certification.certificate import Certificate, ProofEntry
 from colibri.certification.lyapunov import Proof
-from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
+from colibri.certification.planned_attitude import HELD_RAD, PlanFlyer, PlannedAttitude
 from colibri.certification.report import CERTIFICATE, FIGURE, Interval, fly, integrate
 from colibri.cli.main import main
 from colibri.common.types import Array
@@ -35,7 +35,7 @@ def test_the_certificate_is_of_what_flies() -> None:
 
 def test_the_certificate_is_confirmed_in_exact_arithmetic() -> None:
     _, numbers, proof, margins = CERTIFIED.invariant
-    assert certificates.margins_of(FLIGHT, "invariant", numbers, proof) == pytest.approx(margins, rel=0.01)
+    assert certificates.margins_of("invariant", numbers, proof) == pytest.approx(margins, rel=0.01)
     assert min(margins.values()) > 0.0
 
 
@@ -57,21 +57,21 @@ def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
 )
 def test_a_certificate_that_was_tampered_with_is_not_confirmed(what: str, spoil: Callable[[Proof], Proof]) -> None:
     _, numbers, proof, _ = CERTIFIED.invariant
-    assert certificates.margins_of(FLIGHT, "invariant", numbers, spoil(proof))[what] <= 0.0
+    assert certificates.margins_of("invariant", numbers, spoil(proof))[what] <= 0.0
 
 
 @pytest.mark.parametrize(("name", "factor"), [("commanded", 0.8), ("unsure", 4.0)])
 def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(name: str, factor: float) -> None:
     _, numbers, proof, _ = CERTIFIED.invariant
     other = numbers._replace(**{name: (factor * np.array(getattr(numbers, name))).tolist()})
-    assert certificates.margins_of(FLIGHT, "invariant", other, proof)["decrease"] == 0.0
+    assert certificates.margins_of("invariant", other, proof)["decrease"] == 0.0
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", Certificate._fields)
 def test_every_part_of_it_is_confirmed(part: str) -> None:
     _, numbers, proof, _ = getattr(CERTIFIED, part)
-    assert min(certificates.margins_of(FLIGHT, part, numbers, proof).values()) > 0.0
+    assert min(certificates.margins_of(part, numbers, proof).values()) > 0.0
 
 
 @pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
@@ -151,13 +151,13 @@ def test_what_is_refused_is_unstable_indeed(sluggish: str) -> None:
 def left_after(law: PlannedAttitude, error: float) -> float:
     """Return the largest error of the attitude after 6 s that began so large about all axes."""
     numbers = law.numbers_at(0.1)
-    entry = ProofEntry(0.1, numbers, CERTIFIED.invariant.proof, {})
-    flyer = law.flyer(entry, np.zeros((1, 2)), np.random.default_rng(0))
+    thrusts_n = np.array(law.thrusts_n(0.1)[:1])
+    flyer, momentum = PlanFlyer(law, np.zeros((1, 3)), thrusts_n), law.momentum(thrusts_n)
     z, nothing, inertia = np.zeros((1, 12)), np.zeros((1, 3)), np.array(numbers.inertia_kg_m2)
     z[0, [0, 2, 4]] = error
     for _ in range(750):
         commands, remembered = flyer.commands(z)
-        interval = Interval(commands, nothing, inertia, numbers.lag_s, flyer.turn, flyer.momentum())
+        interval = Interval(commands, nothing, inertia, numbers.lag_s, momentum)
         z = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), remembered])
     return float(np.abs(z[0, [0, 2, 4]]).max())
 
