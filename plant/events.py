@@ -118,6 +118,8 @@ def event_of(given: Any, duration_s: float = 0.0) -> Event:
         raise EventError(f'an event must be a table or a text {EVENT}, not {type(given).__name__} "{shown(given)}"')
     values = {key: plain(value) for key, value in given.items()}
     name = values.pop("event", None)
+    if name is None:
+        raise EventError(f'an event needs the key "event" (choose {", ".join(KINDS)}), not only {", ".join(values)}')
     if name not in KINDS:
         raise EventError(unknown("event", name, KINDS))
     if name == "wind" and "wind" in values:

@@ -89,8 +89,9 @@ def _of_file(path: Path) -> ModuleType:
     changed = path.stat().st_mtime_ns
     if path in _modules and _modules[path][0] == changed:
         return _modules[path][1]
-    taken = getattr(sys.modules.get(path.stem), "__file__", None)
-    name = path.stem if taken in (None, str(path)) and path.stem not in sys.builtin_module_names else f"law_{path.stem}"
+    _, before = _modules.get(path, (0, None))
+    free = sys.modules.get(path.stem) in (None, before) and path.stem not in sys.builtin_module_names
+    name = path.stem if free else f"law_{path.stem}"  # an imported module stays, for its classes to be pickled
     spec = spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

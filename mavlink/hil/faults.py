@@ -144,6 +144,7 @@ def short_unit_name(unit: int) -> str:
 
 def number_of(enum: str, given: str | int) -> int:
     """Return the number of a FAILURE_UNIT or FAILURE_TYPE; raise `ValueError` for an unknown name."""
+    __tracebackhide__ = True  # a failed test shows its own lines
     if isinstance(given, int):
         return given
     known = {

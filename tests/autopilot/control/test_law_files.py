@@ -1,8 +1,10 @@
 """A control law in a file, in a module, as a class or as an object is flown, and travels to workers."""
 
+import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +78,13 @@ def test_a_changed_file_is_loaded_again(folder: Path) -> None:
     before = flown("law.py").sha256
     (folder / "law.py").write_text(LAW.replace('{"part": PART}', '{"part": 0.8}'), encoding="utf-8")
     assert flown("law.py").sha256 != before
+
+
+def test_an_imported_module_stays_beside_its_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(folder)
+    law = import_module("law").PID
+    assert flown("law.py").sha256 == flown(law).sha256
+    assert pickle.loads(pickle.dumps(law)) is law
 
 
 def test_a_flight_by_a_file_is_saved_and_read_again(folder: Path) -> None:

@@ -73,7 +73,7 @@ def test_texts_tables_and_structs_are_the_same_events(text: str, struct: Any, sp
         (3, 'an event must be a table or a text T:KIND=VALUE|FILE.toml, not int "3"'),
         ({"event": "payload", "kg": 1}, "payload: Object missing required field t"),
         ({"t": 1, "event": "payload", "kilos": 1}, "payload: Object contains unknown field kilos"),
-        ({"t": 1}, 'unknown event "None" (choose payload, wind'),
+        ({"t": 1}, 'an event needs the key "event" (choose payload, wind'),
         ({"t": float("nan"), "event": "payload", "kg": 1}, "payload: Expected float >= 0.0 - at $.t"),
         ({"t": float("inf"), "event": "payload", "kg": 1}, "payload: t and values must be finite"),
         ("4:mode=takeoff,am", 'not "4:mode=takeoff,am"'),

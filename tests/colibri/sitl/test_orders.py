@@ -39,8 +39,9 @@ def test_what_there_is_not_is_refused_with_what_there_is() -> None:
             sitl.select("holdd")
         with pytest.raises(ValueError, match=r'^unknown track "wavy" \(did you mean "wave"\?\)$'):
             sitl.fly_track("wavy")
-        with pytest.raises(ValueError, match=r'^unknown unit of a failure "motorr" \(did you mean "motor"'):
+        with pytest.raises(ValueError, match=r'^unknown unit of a failure "motorr" \(did you mean "motor"') as refused:
             sitl.inject("motorr", "off")
+        assert refused.traceback[-1].ishidden(refused), "a test shows its own lines"
         with pytest.raises(ValueError, match=r'^unknown message "COLISION" \(did you mean "COLLISION"'):
             sitl.heard("COLISION")
         with pytest.raises(sitl.Refused, match=r"^parameter MPC_CRUISE was refused: does not exist \(result 1\)$"):
