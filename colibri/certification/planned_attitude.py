@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
-from colibri.autopilot.control.lpv_mpc.condensing import PREDICTED
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
 from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc, LpvMpcSettings
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan
+from colibri.autopilot.control.lpv_mpc.planning import PREDICTED
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.scaling import scaled
 from colibri.certification.attitude import (

@@ -20,18 +20,18 @@ matrices, by a Taylor series to the third power of the step:
 
     δx[n+1] = A(x̄[n]) δx[n] + B(x̄[n]) δs[n]
 
-**Condensing** [3.20] (`condensing`). Elimination of the states leaves δx[n] = X[n] z. With the error e[n] of the
+**Condensing** [3.20] (`cost`). Elimination of the states leaves δx[n] = X[n] z. With the error e[n] of the
 nominal motion:
 
     min ½ zᵀ H z + fᵀ z
     H = Σ X[n]ᵀ Q X[n] + X[N]ᵀ S X[N] + R,   f = Σ X[n]ᵀ Q e[n] + X[N]ᵀ S e[N] + r
 
-**Cost** [3.13-3.20]. Q weighs position, velocity, heading and rates at every counted step; for a demanded attitude tilt
-and thrust in their stead. R and r weigh changes of c from the previous plan and from block to block. S is the cost of
-the LQR that flies on after the horizon.
+**Cost** [3.13-3.20] (`cost`). Q weighs position, velocity, heading and rates at every counted step; for a demanded
+attitude tilt and thrust in their stead. R and r weigh changes of c from the previous plan and from block to block. S is
+the cost of the LQR that flies on after the horizon.
 
-**Constraints**, which the thesis leaves out. Rotor limits are bounds on z, so the QP is always feasible. Tilt and rates
-are soft rows with a slack each, in a second QP, solved only if the first plan exceeds them.
+**Constraints** (`constraints`), which the thesis leaves out. Rotor limits are bounds on z, so the QP is always
+feasible. Tilt and rates are soft rows with a slack each, in a second QP, solved only if the first plan exceeds them.
 
 **QP** (`planning`, `mpc`). The unconstrained minimum by Cholesky is the solution if all bounds hold; otherwise the
 profile's solver finds it.

@@ -20,12 +20,11 @@ from colibri.autopilot.control.interface import (
 )
 from colibri.autopilot.control.lpv_mpc import compromise, planning
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation
-from colibri.autopilot.control.lpv_mpc.condensing import PREDICTED
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach
 from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
-from colibri.autopilot.control.lpv_mpc.planning import Now
+from colibri.autopilot.control.lpv_mpc.planning import PREDICTED, Now
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.autopilot.control.parts.level import levelled, seen_level
 from colibri.autopilot.control.parts.recovery import RecoverySettings
@@ -100,7 +99,7 @@ class LawInputs(NamedTuple):
 
 
 class LpvMpc(TrackingLaw[LawMemory]):
-    """The control law; its predicted outputs are `condensing.PREDICTED`, then the squared speeds of the rotors."""
+    """The control law; its predicted outputs are `planning.PREDICTED`, then the squared speeds of the rotors."""
 
     reads_motion = False
     plan_columns = PlanColumns(6, 7, 8, 11)

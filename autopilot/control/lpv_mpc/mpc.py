@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
-from colibri.autopilot.control.lpv_mpc import condensing, deviations, model, planning
-from colibri.autopilot.control.lpv_mpc.condensing import CostWeights, Problem
+from colibri.autopilot.control.lpv_mpc import constraints, deviations, model, planning
+from colibri.autopilot.control.lpv_mpc.cost import CostWeights, Problem
 from colibri.autopilot.control.lpv_mpc.model import Lag, Model
 from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
 from colibri.autopilot.control.lpv_mpc.planning import QpKind, Workspace
@@ -61,7 +61,7 @@ class Plan(NamedTuple):
     """A solved QP."""
 
     commands: Array  # squared speeds at each step, (N, m)
-    states: Array  # `condensing.PREDICTED`, then the squared speeds of m rotors, (N + 1, 12 + m)
+    states: Array  # `planning.PREDICTED`, then the squared speeds of m rotors, (N + 1, 12 + m)
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
@@ -115,7 +115,7 @@ class Mpc:
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
         self.terminal_on_hold = self._terminal(on_hold, settings.count_every, thrust_n)
         self.starts, self._effects = starts, speed_effects(starts, interval_s)
-        blocks, rows = len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
+        blocks, rows = len(settings.blocks), constraints.MOTION_ROWS * (n // settings.check_every)
         shared = Workspace(
             np.empty((n, rotors)),
             np.empty((blocks + 1, rotors)),
@@ -144,7 +144,7 @@ class Mpc:
                     ),
                     shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),
                     empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
-                    empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
+                    empty_qp(inputs * blocks, constraints.SLACKS, rows, settings.slack_weight),
                 )
             )
             for each, inputs in ((on_track, rotors), (on_track, rotors + 1), (on_hold, rotors))
@@ -200,7 +200,7 @@ class Mpc:
             return None, unsolved._replace(qp_iterations=iterations)
         rotors = self._none.shape[1]
         commands = np.empty((self.horizon, rotors))
-        states = np.empty((self.horizon + 1, condensing.PREDICTED + rotors))
+        states = np.empty((self.horizon + 1, planning.PREDICTED + rotors))
         binding = planning.read(qps.kind, z, psi, commands, states)
         active = Active(binding, 0, *soft)
         diagnostics = Diagnostics(

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon
-from colibri.autopilot.control.lpv_mpc.condensing import Integers
+from colibri.autopilot.control.lpv_mpc.cost import Integers
 from colibri.autopilot.control.lpv_mpc.deviations import POSITION, VELOCITY
 from colibri.autopilot.control.qp import Qp
 from colibri.common.config import Positive, Table

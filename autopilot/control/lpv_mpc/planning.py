@@ -8,29 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.condensing import (
-    MOTION_ROWS,
-    Integers,
-    PlanReferences,
-    Problem,
-    bound,
-    cost,
-    exceeds,
-    limit_motion,
-    read_plan,
-)
-from colibri.autopilot.control.lpv_mpc.deviations import StepTransition, respond
+from colibri.autopilot.control.lpv_mpc.constraints import MOTION_ROWS, bound, exceeds, limit_motion
+from colibri.autopilot.control.lpv_mpc.cost import Integers, PlanReferences, Problem, cost, nearest_angle
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, RATE, ROTATION, StepTransition, respond
 from colibri.autopilot.control.lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.qp import Qp
 from colibri.autopilot.control.vehicle_model.battery import fill_limits
+from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
+PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 _BINDING = 1e-9  # an active limit has this or less left
 
 
@@ -255,8 +248,47 @@ def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> 
             if z[k] <= qp.lower[k] + _BINDING or z[k] >= qp.upper[k] - _BINDING:
                 binding += 1
     _correct(work.commands, corrections, starts, commands)
-    read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi, states)
+    _read_states(work.motion, work.speeds, work.responses, z, work.levels, psi, states)
     return binding
+
+
+@inlined
+def _read_states(
+    motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
+) -> None:
+    """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
+    inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
+    for step in range(motion.shape[0]):
+        x, X, state = motion[step], responses[step], states[step]
+        for part in range(0, DEVIATIONS, 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for block in range(levels.shape[0]):
+                for k in range(inputs * block, inputs * block + speeds.shape[1]):  # four sums: none waits for another
+                    a += X[part, k] * z[k]
+                    b += X[part + 1, k] * z[k]
+                    c += X[part + 2, k] * z[k]
+                    d += X[part + 3, k] * z[k]
+            change[part], change[part + 1], change[part + 2], change[part + 3] = a, b, c, d
+        for i in range(6):
+            state[i] = x[i] + change[i]
+        a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
+        length = sqrt(1.0 + a * a + b * b + c * c)
+        w, x_, y, z_ = x[6] / length, x[7] / length, x[8] / length, x[9] / length
+        turned = (
+            w - a * x_ - b * y - c * z_,
+            x_ + a * w + c * y - b * z_,
+            y + b * w + a * z_ - c * x_,
+            z_ + c * w + b * x_ - a * y,
+        )
+        phi, theta, yaw = euler_from_quaternion(turned)
+        psi += nearest_angle(yaw - psi)
+        state[6], state[7], state[8] = phi, theta, psi
+        for i in range(3):
+            state[9 + i] = x[10 + i] + change[RATE + i]
+        for rotor in range(speeds.shape[1]):
+            state[12 + rotor] = speeds[step, rotor]
+            for block in range(levels.shape[0]):
+                state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
 
 
 @inlined

@@ -7,7 +7,7 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import feed_forward
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation, compromise, stay_within
-from colibri.autopilot.control.lpv_mpc.condensing import PlanReferences
+from colibri.autopilot.control.lpv_mpc.cost import PlanReferences
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide

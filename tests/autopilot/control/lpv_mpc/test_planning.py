@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.lpv_mpc import condensing, planning
+from colibri.autopilot.control.lpv_mpc import constraints, planning
 from colibri.autopilot.control.qp import Qp, QpSolver
 
 STARTS, ROTORS = np.array([0, 1, 3, 6]), 4
@@ -41,7 +41,7 @@ def test_bounds_keep_the_commands_within_their_limits(seed: int) -> None:
     limits = np.stack([np.full(6, 0.01), rng.uniform(0.6, 1.0, 6)], axis=1)
     commands = rng.uniform(limits[:, :1], limits[:, 1:], (6, ROTORS))
     corrections, lower, upper = rng.normal(size=(3, ROTORS)), np.empty(12), np.empty(12)
-    condensing.bound(commands, limits, corrections, STARTS, lower, upper)
+    constraints.bound(commands, limits, corrections, STARTS, lower, upper)
     assert (lower <= 0.0).all()
     assert (upper >= 0.0).all()
     for z in (lower, upper):

@@ -1,4 +1,4 @@
-"""The QP, condensed to changes of the corrections, as compiled kernels.
+"""The cost of the QP, condensed to changes of the corrections, as compiled kernels.
 
     z = changes of the corrections: of each rotor in each block, then two slacks if limits are soft
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
@@ -15,18 +15,13 @@ from numpy.typing import NDArray
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
 from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
 from colibri.autopilot.control.qp import Qp
-from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import compiled, inlined
 from colibri.common.kernels import atan2
 from colibri.common.matrices import put
 from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
-
-SLACKS = 2
-TILT_SLACK, RATE_SLACK = 0, 1
-MOTION_ROWS = 7  # of each checked step: tilt, and both sides of p, q and r
-PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 
 
 class CostWeights(NamedTuple):
@@ -132,7 +127,7 @@ def _add_motion(
     R = rotation_matrix((x[6], x[7], x[8], x[9]))
     cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
     s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
-    heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
+    heading = cos_pitch * nearest_angle(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
     if not problem.upright:
         on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
     for k in range(used):
@@ -180,7 +175,7 @@ def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array)
 
 
 @compiled
-def _nearest(angle: float) -> float:
+def nearest_angle(angle: float) -> float:
     return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
 
 
@@ -258,105 +253,3 @@ def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f:
                 H[here - inputs, here - inputs] += weight
                 H[here, here - inputs] -= weight
                 f[here - inputs] -= change
-
-
-@inlined
-def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
-    """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
-
-    `commands` of the references, (N, m); `limits` (N, 2); `corrections` of each block, (b, m).
-    """
-    inputs = lower.shape[0] // corrections.shape[0]
-    for block in range(corrections.shape[0]):
-        for rotor in range(commands.shape[1]):
-            least, most = -np.inf, np.inf
-            for step in range(starts[block], starts[block + 1]):
-                least = max(least, limits[step, 0] - commands[step, rotor])
-                most = min(most, limits[step, 1] - commands[step, rotor])
-            corrections[block, rotor] = min(max(corrections[block, rotor], least), most)
-            lower[inputs * block + rotor] = least - corrections[block, rotor]
-            upper[inputs * block + rotor] = most - corrections[block, rotor]
-
-
-@compiled
-def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
-    rates, turned = np.empty(3), np.empty(2)
-    for step in problem.checked:
-        x, X = motion[step], responses[step]
-        R = rotation_matrix((x[6], x[7], x[8], x[9]))
-        for i in range(3):
-            rates[i] = x[10 + i]
-            for k in range(z.shape[0]):
-                rates[i] += X[RATE + i, k] * z[k]
-            if abs(rates[i]) > problem.max_rate[i]:
-                return True
-        turned[:] = 0.0
-        for i in range(2):
-            for k in range(z.shape[0]):
-                turned[i] += X[ROTATION + i, k] * z[k]
-        if R[2][2] + R[2][0] * turned[1] - R[2][1] * turned[0] < problem.min_cos_tilt:
-            return True
-    return False
-
-
-@compiled
-def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h: Array) -> None:
-    """Fill the soft rows of tilt and rates, each in parts of its limit."""
-    moved = responses.shape[2]
-    count = 0
-    G[:, :] = 0.0
-    for step in problem.checked:
-        x, X = motion[step], responses[step]
-        R = rotation_matrix((x[6], x[7], x[8], x[9]))
-        for k in range(moved):
-            G[count, k] = R[2][1] * X[ROTATION, k] - R[2][0] * X[ROTATION + 1, k]
-        G[count, moved + TILT_SLACK] = -1.0
-        h[count] = R[2][2] - problem.min_cos_tilt
-        for i in range(3):
-            limit = problem.max_rate[i]
-            for side in range(2):
-                sign, at = 1.0 - 2.0 * side, count + 1 + 2 * i + side
-                for k in range(moved):
-                    G[at, k] = sign * X[RATE + i, k] / limit
-                G[at, moved + RATE_SLACK] = -1.0
-                h[at] = 1.0 - sign * x[10 + i] / limit
-        count += MOTION_ROWS
-
-
-@inlined
-def read_plan(
-    motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
-) -> None:
-    """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
-    inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
-    for step in range(motion.shape[0]):
-        x, X, state = motion[step], responses[step], states[step]
-        for part in range(0, DEVIATIONS, 4):
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for block in range(levels.shape[0]):
-                for k in range(inputs * block, inputs * block + speeds.shape[1]):  # four sums: none waits for another
-                    a += X[part, k] * z[k]
-                    b += X[part + 1, k] * z[k]
-                    c += X[part + 2, k] * z[k]
-                    d += X[part + 3, k] * z[k]
-            change[part], change[part + 1], change[part + 2], change[part + 3] = a, b, c, d
-        for i in range(6):
-            state[i] = x[i] + change[i]
-        a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
-        length = sqrt(1.0 + a * a + b * b + c * c)
-        w, x_, y, z_ = x[6] / length, x[7] / length, x[8] / length, x[9] / length
-        turned = (
-            w - a * x_ - b * y - c * z_,
-            x_ + a * w + c * y - b * z_,
-            y + b * w + a * z_ - c * x_,
-            z_ + c * w + b * x_ - a * y,
-        )
-        phi, theta, yaw = euler_from_quaternion(turned)
-        psi += _nearest(yaw - psi)
-        state[6], state[7], state[8] = phi, theta, psi
-        for i in range(3):
-            state[9 + i] = x[10 + i] + change[RATE + i]
-        for rotor in range(speeds.shape[1]):
-            state[12 + rotor] = speeds[step, rotor]
-            for block in range(levels.shape[0]):
-                state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
