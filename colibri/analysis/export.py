@@ -3,9 +3,9 @@
 import csv
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from heapq import merge
-from io import BufferedReader, FileIO
+from io import BufferedReader, FileIO, StringIO
 from itertools import chain
 from os import fstat
 from pathlib import Path
@@ -57,7 +57,7 @@ def read_log(log: Path) -> "ULog":
     with _needed("pyulog", "export"):
         from pyulog import ULog
     try:
-        with FileIO(log, opener=regular) as file:
+        with FileIO(log, opener=regular) as file, redirect_stdout(StringIO()):  # pyulog prints what is damaged
             return ULog(_Bounded(file))
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error

@@ -49,9 +49,9 @@ def vehicle(args: Namespace) -> int:
     if args.whom is None:
         fail("--for px4 or ardupilot is required (a new vehicle: vehicle new NAME)")
     of_new = ("mass", "arm", "wheelbase", "propeller", "motor", "kv", "cells", "capacity", "lag", "inertia", "drag")
-    stray = next((option for option in of_new if getattr(args, option) is not None), None)
+    stray = next((option for option in (*of_new, "from_log") if getattr(args, option) is not None), None)
     if stray:
-        fail(f"--{stray} is an option of vehicle new NAME")
+        fail(f"--{stray.replace('_', '-')} is an option of vehicle new NAME")
     with one_line():
         described = load_vehicle(args.name)
         made_by = f"{described.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
@@ -74,16 +74,20 @@ def _new(args: Namespace) -> int:
         fail(f'vehicle new "{args.new_name}": must be a name without folders (a path goes to --out)')
     if out.suffix != ".toml":
         fail(f'--out "{out}": must end in .toml')
+    measured = {"thrust": args.thrust_stand, "rotor lag": args.lag, "inertia": args.inertia, "drag": args.drag}
+    estimated = ", ".join(name for name, value in measured.items() if value is None)
     with one_line():
         text, notes = vehicle_file(_sheet(args, name))
+        lines = [f"wrote {out}: {notes[0]}", *notes[1:], *([f"not measured: {estimated}"] if estimated else [])]
+        if args.from_log is not None:
+            from colibri.analysis.refinement import refined  # SciPy and Numba load slowly
+
+            text, table = refined(text, args.from_log)
+            lines = [*table, f"wrote {out}"]
     if out.exists() and not args.force:
         fail(f"{out} exists: choose another name, or --force to overwrite it")
     _write(out, text)
-    path = shlex.quote(str(out))
-    measured = {"thrust": args.thrust_stand, "rotor lag": args.lag, "inertia": args.inertia, "drag": args.drag}
-    estimated = ", ".join(name for name, value in measured.items() if value is None)
-    lines = [f"wrote {out}: {notes[0]}", *notes[1:], *([f"not measured: {estimated}"] if estimated else [])]
-    sys.stdout.write("\n".join([*lines, f"next: colibri fly hover --vehicle {path}"]) + "\n")
+    sys.stdout.write("\n".join([*lines, f"next: colibri fly hover --vehicle {shlex.quote(str(out))}"]) + "\n")
     return 0
 
 

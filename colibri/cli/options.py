@@ -225,6 +225,7 @@ def vehicle(parser: ArgumentParser) -> None:
     add("--lag", "S", "with new: measured time constant of the rotors", type=float)
     add("--inertia", "X,Y,Z", "with new: measured moments of inertia, kg m²")
     add("--drag", "N_S_M", "with new: measured horizontal drag, N per m/s", type=float)
+    add("--from-log", "FILE", "with new: fit numbers to a log, .ulg (PX4, Colibri) or .bin (ArduPilot)", type=Path)
     parser.flag("--force", "with new: overwrite the file")
 
 

@@ -223,6 +223,8 @@ def test_a_new_vehicle_is_written_and_not_overwritten(tmp_path: Path, ran: Ran, 
     assert refused("vehicle", "new").endswith("a name is required")
     assert refused("vehicle", out, "--for", "px4", "--mass", 3) == "--mass is an option of vehicle new NAME"
     assert refused("vehicle", "hummingbird").startswith("--for px4 or ardupilot is required")
+    log = tmp_path / "flight.ulg"
+    assert refused("vehicle", "new", "other", *options, "--from-log", log) == f"{log}: No such file or directory"
 
 
 def test_a_plant_with_another_rotor_order_is_refused(tmp_path: Path, ran: Ran, refused: Refused) -> None:
