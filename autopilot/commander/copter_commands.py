@@ -128,7 +128,9 @@ class CopterCommands(Commands):
             **dict.fromkeys(_ACCEPTED, lambda _: None),
             mav.MAV_CMD_NAV_VTOL_LAND: lambda _: self.select(Mode.LAND),
             mav.MAV_CMD_DO_FENCE_ENABLE: self._enable_fence,
-            mav.MAV_CMD_DO_SET_SERVO: self._set_servo,
+            mav.MAV_CMD_DO_SET_SERVO: lambda it: (
+                None if it.p1 >= 1.0 else Refusal(f"servo: {it.p1:g} is not 1 or more", FAILED)
+            ),
             mav.MAV_CMD_DO_MOTOR_TEST: self._test_motors,
             mav.MAV_CMD_DO_JUMP_TAG: self._jump_to_tag,
             mav.MAV_CMD_DO_LAND_START: lambda _: Refusal("No landing sequence found", FAILED),
@@ -217,9 +219,6 @@ class CopterCommands(Commands):
         elif command.p1 != 1.0 and command.x not in _CALIBRATED and command.p2 != _CALIBRATED[-1]:
             return Refusal("calibration refused: only gyro, pressure, accel and level are known", UNSUPPORTED)
         return None
-
-    def _set_servo(self, command: ReceivedCommand) -> Refusal | None:
-        return None if command.p1 >= 1.0 else Refusal(f"servo: {command.p1:g} is not 1 or more", FAILED)
 
     def _test_motors(self, command: ReceivedCommand) -> Refusal | None:
         if self._pilot.state.armed:

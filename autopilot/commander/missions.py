@@ -74,10 +74,6 @@ class Missions:
         self._behaviour = behaviour
         self._fence.adopt(behaviour)
 
-    @property
-    def _max_height_m(self) -> float:
-        return COPTERS_MAX_HEIGHT_M if self._behaviour.copter_items else MAX_HEIGHT_M
-
     def load(self, plan_type: int, plan: StoredPlan) -> None:
         self.changes += 1
         items: Sequence[MissionItem] = plan.items
@@ -209,10 +205,12 @@ class Missions:
         """Report bad items; `outside` names one outside the fence."""
         home, items, said = self._home, self.executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
-        without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if self._behaviour.copter_items else _ON_THE_GROUND
+        copter = self._behaviour.copter_items
+        without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if copter else _ON_THE_GROUND
+        max_height_m = COPTERS_MAX_HEIGHT_M if copter else MAX_HEIGHT_M
         flown = [each for each in found if items[each[0]].command not in without]
         reasons = {
-            Need.WITHIN_REACH: _first(found, partial(too_far, max_height_m=self._max_height_m)),
+            Need.WITHIN_REACH: _first(found, partial(too_far, max_height_m=max_height_m)),
             Need.INSIDE_FENCE: outside,
             Need.ABOVE_GROUND: _first(flown, lambda place: (home.refusal(place[2]) or _NONE).reason),
         }

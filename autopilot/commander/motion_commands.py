@@ -90,7 +90,10 @@ class MotionCommands:
         ground_m = pilot.ground.height_m
         up_m = ground_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
-            up_m = self._height_of_takeoff(command)
+            frame = command.frame
+            if frame is None or frame in _NO_FRAME:  # QGC, which sends a pitch of -1, means above sea level
+                frame = mav.MAV_FRAME_GLOBAL if command.p1 == -1.0 else mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
+            up_m = height_m(command.z, frame, self._home.position_enu_m[2], self._home.origin)
         if not ground_m + MIN_CLIMB_M <= up_m < MAX_HEIGHT_M:
             above = f"{round(up_m - ground_m, 3):g} m above the ground"
             return denied("take-off", f"{above} is not within {MIN_CLIMB_M:g} to {MAX_HEIGHT_M:g}")
@@ -103,13 +106,6 @@ class MotionCommands:
         if refusal is None:
             self.warn_elsewhere(command, "take-off")
         return refusal
-
-    def _height_of_takeoff(self, command: ReceivedCommand) -> float:
-        """Return z of ENU, m; QGC, which sends a pitch of -1, means above sea level."""
-        frame = command.frame
-        if frame is None or frame in _NO_FRAME:
-            frame = mav.MAV_FRAME_GLOBAL if command.p1 == -1.0 else mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
-        return height_m(command.z, frame, self._home.position_enu_m[2], self._home.origin)
 
     def _reposition(self, command: ReceivedCommand) -> Refusal | None:
         """Fly to a place, or stop if all are nan."""

@@ -6,13 +6,14 @@ from typing import Any
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
+from colibri.autopilot.ground.snapshots import first
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.rotations import tilt_deg
 from colibri.companion.orders import Orders
 from colibri.companion.setpoints import LogRow, TrackErrors, message_of, row_of
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stack import Response, Thrust
-from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
+from colibri.companion.steering.law_pilot import LawDemand, LawPilot
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.references import PastReference, ReferenceHistory, StepFlight, smoothly_started
 from colibri.companion.supervision import rules

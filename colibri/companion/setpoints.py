@@ -5,11 +5,12 @@ from math import acos, cos, dist, nan, sqrt
 from typing import Any
 
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
+from colibri.autopilot.ground.snapshots import first
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Array, Vector
 from colibri.companion.settings import SetpointKind
 from colibri.companion.steering import predictor as model
-from colibri.companion.steering.law_pilot import LawDemand, first
+from colibri.companion.steering.law_pilot import LawDemand
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.conversation import Encoded
 from colibri.mavlink.client.setpoints import attitude_target, position_target

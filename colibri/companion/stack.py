@@ -111,8 +111,6 @@ class Response(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stack:
-    """A flight stack."""
-
     name: str
     autopilot: int
     offboard: FlightMode

@@ -137,8 +137,6 @@ _MAX_DEATHS, _LOOP_S = 3, 60.0  # a vehicle with more deaths of its processes in
 
 @dataclass(slots=True, eq=False)
 class Member:
-    """One vehicle of the fleet."""
-
     instance: int  # ports and system id follow from it
     east_m: float
     links: list[str]  # URLs that its autopilot serves; once open, with actual ports

@@ -27,9 +27,8 @@ from colibri.gym.errors import GymError
 from colibri.plant.environment.turbulence import CALM
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import RK4_STEP_S
-from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import starting_world
+from colibri.plant.physics.world import parameters_of, starting_world
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 ACTIONS = ("rotors", "rates", "attitude", "velocity", "position")

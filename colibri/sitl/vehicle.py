@@ -41,8 +41,6 @@ _FIRST_STICKS_S = 0.2  # time to get first sticks through a faulty link
 
 
 class Links(NamedTuple):
-    """Link faults."""
-
     ground: Trouble  # between the vehicle and all ground stations, in simulated time
     plant: Trouble  # between plant and autopilot; the flight stays the same, as frames are repeated
 

@@ -26,8 +26,6 @@ COPTER_CAPABILITIES = (CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """An identity on the wire."""
-
     name: str
     autopilot: int  # MAV_AUTOPILOT
     product: str = ""  # name of the emulated program in texts; empty without one

@@ -31,8 +31,6 @@ LOW_US = 950
 
 
 class RadioSettings(Protocol):
-    """Values by name."""
-
     def __getitem__(self, name: str, /) -> float: ...
 
 

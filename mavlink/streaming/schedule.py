@@ -1,5 +1,6 @@
 """Due times of messages per channel, without drift and bursts."""
 
+from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from typing import TypeAlias
 
@@ -9,14 +10,12 @@ GOLDEN = 0.6180339887498949  # the fractional parts of its multiples are evenly 
 STALE_ALLOWED = 64
 
 
+@dataclass(slots=True, eq=False)
 class _Entry:
-    __slots__ = ("interval_us", "key", "live", "phase_us")
-
-    def __init__(self, key: Key, interval_us: int, phase_us: int) -> None:
-        self.key = key
-        self.interval_us = interval_us
-        self.phase_us = phase_us
-        self.live = True
+    key: Key
+    interval_us: int
+    phase_us: int
+    live: bool = True
 
     def after(self, now_us: int) -> int:
         return now_us + self.interval_us - (now_us - self.phase_us) % self.interval_us

@@ -1,7 +1,6 @@
 """The truth in PX4's topics, for viewers."""
 
 from math import isnan, nan, pi
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,30 +18,22 @@ _turned = Turned(TRUTH.names, RATES=(frd_from_flu, "p q r"), POSITION=(ned_from_
 _RATES, _POSITION = _turned.places.values()
 
 
-class TruthVehicle(NamedTuple):
-    """Units of a vehicle's truth."""
-
-    rad_s_per_speed_unit: float  # of its rotor speeds
-    capacity_ah: float  # of its battery; 0 without one
-    rotors: int = 4
-
-
 class TruthBlocks(Blocks):
-    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH`, if any."""
+    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH`, if any; `capacity_ah` is 0 without a battery."""
 
-    def __init__(self, vehicle: TruthVehicle) -> None:
-        more = vehicle.rotors > ROTORS
+    def __init__(self, rad_s_per_speed_unit: float, capacity_ah: float, rotors: int = ROTORS) -> None:
+        more = rotors > ROTORS
         super().__init__(len(TRUTH.names) + more * ROTORS)
         omegas = TRUTH.names.index("omega1")
         self._omegas = [*range(omegas, omegas + ROTORS), *range(len(TRUTH.names), len(TRUTH.names) + more * ROTORS)]
-        self._capacity_ah = vehicle.capacity_ah
-        self._rpm_per_unit = vehicle.rad_s_per_speed_unit * 30.0 / pi
+        self._capacity_ah = capacity_ah
+        self._rpm_per_unit = rad_s_per_speed_unit * 30.0 / pi
         self._charge_s = self._charge_ah = nan
         self._records = Records(
             BLOCK_ROWS, topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS
         )
         self._records[topics.POSITION_TRUTH, "xy_valid"][:] = True
-        self._records[topics.ESCS, "esc_count"][:] = (vehicle.rotors, *(2**vehicle.rotors - 1,) * 2)
+        self._records[topics.ESCS, "esc_count"][:] = (rotors, *(2**rotors - 1,) * 2)
 
     def encode(self, table: Array) -> bytes:
         count, records, turned = len(table), self._records, _turned(table)

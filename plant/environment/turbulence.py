@@ -109,8 +109,6 @@ CALM: Vector = (0.0, 0.0, 0.0)
 
 
 class Air:
-    """The air of one weather."""
-
     def __init__(self, weather: Weather) -> None:
         self._gusts = weather.gusts
         self._intensity = weather.turbulence

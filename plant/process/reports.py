@@ -19,7 +19,7 @@ from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import MORE_TRUTH, TRUTH, split
 from colibri.mavlink.ulog.log import FileLog, TopicLog, beginning
 from colibri.mavlink.ulog.reader import FILE
-from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
+from colibri.mavlink.ulog.truth import TruthBlocks
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 from colibri.plant.physics.world import World
 from colibri.plant.vehicle.description import Vehicle
@@ -97,7 +97,7 @@ class TruthLog:
         self._log = log
         self._blocks, self._thinning = None, Thinning()
         if log.for_viewers:
-            self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count))
+            self._blocks = TruthBlocks(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count)
 
     def write_world(self, world: World) -> None:
         speeds, others = split(world.rotor_speeds)

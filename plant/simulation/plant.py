@@ -24,8 +24,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Faults:
-    """Active faults of one vehicle."""
-
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
         self._physics, self._battery = physics, vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)

@@ -23,9 +23,7 @@ class Readiness:
 
     @property
     def may_arm(self) -> bool:
-        if self.rotor_failed or self.error or next(refusals(self.inputs), None) is not None:
-            return False
-        return self.further is None or not any(self.further())
+        return not self.refusals()
 
     @property
     def only_lands(self) -> str:

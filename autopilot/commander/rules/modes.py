@@ -8,8 +8,6 @@ from colibri.mavlink.wire.dialect import Refusal, mav
 
 
 class Mode(StrEnum):
-    """A flight mode."""
-
     STABILIZED = "stabilized"
     ALTITUDE = "altitude"
     POSITION = "position"

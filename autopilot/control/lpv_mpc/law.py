@@ -90,8 +90,6 @@ class LawMemory(NamedTuple):
 
 
 class LawInputs(NamedTuple):
-    """Inputs of a decision."""
-
     observed: Observed
     psi: float  # yaw, rad, unwrapped
     max_n: float  # largest thrust

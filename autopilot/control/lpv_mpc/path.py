@@ -52,8 +52,6 @@ class PathLimits(NamedTuple):
 
 
 class PathNow(NamedTuple):
-    """The path in one QP."""
-
     speeds: Array  # nominal σ, (N + 2,)
     slopes: Array  # P', P'', (N + 2, 6)
     part: float  # of the motion of the references that counts

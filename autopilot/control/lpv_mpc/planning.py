@@ -52,8 +52,6 @@ class Workspace(NamedTuple):
 
 
 class QpKind(NamedTuple):
-    """QPs of one kind."""
-
     problem: Problem
     work: Workspace
     qp: Qp  # within rotor limits

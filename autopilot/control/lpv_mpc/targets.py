@@ -29,8 +29,6 @@ class Wanted(NamedTuple):
 
 
 class TargetBuilder:
-    """Builds the targets of plans."""
-
     def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc, *, upright: bool) -> None:
         self._guidance, self._path, self._mpc, self._upright = guidance, path, mpc, upright
         self._compromise, self._none = packed(compromise(guidance.interval_s)), Deviation.none()

@@ -11,7 +11,7 @@ from colibri.autopilot.core.defence.errors import Defence
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.common.earth.atmosphere import altitude_m
-from colibri.common.rotations import earth_from_body, normalized, rotation_matrix
+from colibri.common.rotations import earth_from_body, normalized, quaternion_product, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.sensors import Frame, SensorFrame, Updated
 from colibri.mavlink.hil.state import StateFrame
@@ -83,11 +83,8 @@ class InertialEstimate:
 
 def turned(attitude: Quaternion, rate: Vector, interval_s: float) -> Quaternion:
     """Return an attitude after a short turn at body rates, rad/s, to the second order."""
-    w, x, y, z = attitude
     p, q, r = (0.5 * interval_s * each for each in rate)
-    return normalized(
-        (w - p * x - q * y - r * z, x + p * w + r * y - q * z, y + q * w - r * x + p * z, z + r * w + q * x - p * y)
-    )
+    return normalized(quaternion_product(attitude, (1.0, p, q, r)))
 
 
 def _read(frame: SensorFrame, group: int, value: Vector, bias: Vector) -> Vector | None:

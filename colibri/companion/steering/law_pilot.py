@@ -17,6 +17,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import Factory
 from colibri.autopilot.control.vehicle_model import motion
 from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
+from colibri.autopilot.ground.snapshots import first
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.guidance import instants
 from colibri.autopilot.guidance.integrator_chain import Limits
@@ -219,12 +220,6 @@ def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
     if behind_s == 0.0:
         return turned
     return turned.replace("rotors.lag", {"time_constant_up_s": behind_s, "time_constant_down_s": behind_s})
-
-
-def first(rows: Array) -> Vector:
-    """Return the first row of (n, 3)."""
-    x, y, z = rows[0].tolist()
-    return (x, y, z)
 
 
 def _frame(time_us: int, y: Array) -> StateFrame:

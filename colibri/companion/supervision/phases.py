@@ -6,7 +6,7 @@ from enum import StrEnum
 from math import acos, dist
 from typing import NamedTuple
 
-from colibri.common.rotations import normalized
+from colibri.common.rotations import normalized, quaternion_product
 from colibri.common.types import Quaternion, Vector
 from colibri.companion.supervision.rules import FlightFacts, Rule
 from colibri.companion.vehicle_peer import ReceivedState
@@ -174,11 +174,8 @@ def _mean(a: Vector, b: Vector) -> Vector:
 
 
 def _turned(q: Quaternion, by_rad: Vector) -> Quaternion:
-    w, x, y, z = q
     p, q_, r = (0.5 * angle for angle in by_rad)
-    return normalized(
-        (w - x * p - y * q_ - z * r, x + w * p + y * r - z * q_, y + w * q_ + z * p - x * r, z + w * r + x * q_ - y * p)
-    )
+    return normalized(quaternion_product(q, (1.0, p, q_, r)))
 
 
 _WINDOW_US = 1_000_000

@@ -168,8 +168,6 @@ F = TypeVar("F", bound=FlightFacts)
 
 
 class Rule(NamedTuple, Generic[F]):
-    """A row of a table."""
-
     name: str
     broken: Callable[[F], bool]
     words: Callable[[F], str]  # what is wrong; of a check with advice

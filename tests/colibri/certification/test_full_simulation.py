@@ -24,7 +24,7 @@ from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Array, Quaternion
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import fixed_step
-from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.physics.world import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.certificates import read_certificate
 

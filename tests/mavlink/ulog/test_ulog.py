@@ -132,7 +132,7 @@ def test_samples_are_thinned_alike_in_every_log() -> None:
 
 
 def test_the_truth_is_in_ned_and_frd() -> None:
-    blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0))
+    blocks = truth.TruthBlocks(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0)
     east = dict.fromkeys(TRUTH.names, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
     east |= {"x": 1.0, "y": 2.0, "z": 3.0, "omega2": 5000.0, "voltage_v": 12.0}
     rows = [east | {"t": 0.004 * number, "charge_ah": 0.001 * number} for number in range(2 * BLOCK_ROWS + 3)]
@@ -149,7 +149,7 @@ def test_the_truth_is_in_ned_and_frd() -> None:
 
 
 def test_extreme_numbers_and_a_missing_battery_are_written() -> None:
-    blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=1.0, capacity_ah=0.0))
+    blocks = truth.TruthBlocks(rad_s_per_speed_unit=1.0, capacity_ah=0.0)
     log = read(encoded(blocks, [0.0, *[1e300] * (len(TRUTH.names) - 1)]))
     assert [found.name for found in log.data_list if found.name == topics.BATTERY] == []
     assert data(log, topics.POSITION_TRUTH)["z"].tolist() == [-np.inf]

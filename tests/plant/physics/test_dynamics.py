@@ -13,8 +13,8 @@ from colibri.common.types import Array, Quaternion, Vector
 from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import adaptive_step
-from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.plant_flights import flight, hover, hummingbird, rpm
 from tests.support.states import derivative

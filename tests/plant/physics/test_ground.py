@@ -11,9 +11,8 @@ from colibri.common.types import Quaternion, Vector
 from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import contact_wrench
 from colibri.plant.physics.integrators import Integrator
-from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import starting_world
+from colibri.plant.physics.world import parameters_of, starting_world
 from colibri.plant.texts import wind
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from tests.support.plant_flights import OFF, flight, hover, rpm, states

@@ -11,9 +11,8 @@ from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.integrators import Integrator, adaptive_step, fixed_step, runge_kutta_4
-from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start
-from colibri.plant.physics.world import Physics, World
+from colibri.plant.physics.world import Physics, World, parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.plant_flights import command, flight, hummingbird, states
 

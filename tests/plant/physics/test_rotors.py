@@ -13,9 +13,8 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.turbulence import CALM
 from colibri.plant.physics.equations import close
 from colibri.plant.physics.integrators import Integrator
-from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.physics.world import Physics, parameters_of, starting_world
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from tests.support.plant_flights import OFF, command, flight, hummingbird, rpm, speeds
 

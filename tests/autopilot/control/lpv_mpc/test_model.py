@@ -9,7 +9,7 @@ from colibri.autopilot.control.lpv_mpc.model import Model
 from colibri.autopilot.control.lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import rotation_matrix
-from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.physics.world import parameters_of
 from tests.support.lpv_mpc import HUMMINGBIRD, INTERVAL_S, ROTORS, STARTS, STEPS, rolled, start
 from tests.support.states import derivative
 

@@ -12,7 +12,7 @@ from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Vector
 from colibri.plant.physics.equations import rotor_momentum, rotor_wrench
-from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.physics.world import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.strategies import reals, vectors
 
