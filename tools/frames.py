@@ -20,10 +20,11 @@ from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
 from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from colibri.sitl.ground_station import Station
 from colibri.sitl.mission_items import on_wire, polygon, waypoint
+from colibri.sitl.vehicle import FORCE
 from tools.fuzz.messages import COMMANDS, Messages
-from tools.fuzz.vehicle import HIGH, BareFlight
-from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
+from tools.fuzz.vehicle import COMPONENT, HIGH, SYSTEM, BareFlight
 from tools.harness.frame_times import FrameTimes
 
 TO = (SYSTEM, COMPONENT)
@@ -132,8 +133,8 @@ def _bursts(_flight: BareFlight) -> Iterator[list[bytes]]:
     yield [file(_BURST, session=i) for i in range(8)]
 
 
-def _others(flight: BareFlight) -> list[HarnessClient]:
-    return [flight.add(HarnessClient(port=20_000 + i)) for i in range(STATIONS - 1)]
+def _others(flight: BareFlight) -> list[Station]:
+    return [flight.add(Station, 255) for _ in range(STATIONS - 1)]
 
 
 def _streams(flight: BareFlight) -> Iterator[list[bytes]]:
@@ -141,7 +142,7 @@ def _streams(flight: BareFlight) -> Iterator[list[bytes]]:
     for client in _others(flight):
         for name in names:
             number = getattr(mav, f"MAVLINK_MSG_ID_{name}", 0)
-            client.send("COMMAND_LONG", *TO, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0, number, 4000.0, *(0.0,) * 5)
+            client.send_raw(command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, 4000.0))
     yield []
 
 
@@ -259,7 +260,7 @@ REQUESTS: Mapping[str, Request] = {
 def in_the_air(flight: BareFlight) -> None:
     flight.reset_world(HIGH)
     flight.copter.pilot.ground.take_off(0)
-    flight.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 21196.0)
+    flight.client.order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
     flight.run(0.2)
 
 
@@ -268,22 +269,12 @@ MOST_BYTES = 4096  # what a link receives at once
 FILES = 999
 
 
-class Timed:
-    def __init__(self, flight: BareFlight) -> None:
-        self.flight = flight
-        self._frames_s = FrameTimes(flight.autopilot)
-
-    @property
-    def times(self) -> tuple[float, float]:
-        """The longest frame and all frames, ms of work."""
-        return 1e3 * max(self._frames_s), 1e3 * sum(self._frames_s)
-
-    def send(self, messages: list[bytes]) -> None:
-        while sum(map(len, messages)) > MOST_BYTES:
-            messages.pop()
-        if messages:
-            self.flight.client.send_raw(b"".join(messages))
-        self.flight.step()
+def fly_frame(flight: BareFlight, messages: list[bytes]) -> None:
+    while sum(map(len, messages)) > MOST_BYTES:
+        messages.pop()
+    if messages:
+        flight.client.send_raw(b"".join(messages))
+    flight.step()
 
 
 def main() -> int:
@@ -315,17 +306,18 @@ def _print(name: str, worst_ms: float, total_ms: float) -> None:
 def _times(
     request: Request, garbage: Callable[[], AbstractContextManager[None]], frames_after: int = 0
 ) -> tuple[float, float]:
+    """Return the longest frame and all frames, ms of work."""
     with TemporaryDirectory() as folder, closing(_files(Path(folder))) as files:
         flight = BareFlight(files=files)
         in_the_air(flight)
         flight.run(0.3)
-        timed = Timed(flight)
+        frames_s = FrameTimes(flight.autopilot)
         with garbage():
             for messages in request(flight):
-                timed.send(list(messages))
+                fly_frame(flight, list(messages))
             for _ in range(frames_after):
-                timed.send([])
-    return timed.times
+                flight.step()
+    return 1e3 * max(frames_s), 1e3 * sum(frames_s)
 
 
 def _random(count: int) -> Request:

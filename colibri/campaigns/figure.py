@@ -90,8 +90,7 @@ def _title(table: FlightTable) -> str:
 
 def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
     found: Array = values[table.through(places)]
-    known: Array = found[np.isfinite(found)]
-    return known
+    return found[np.isfinite(found)]
 
 
 def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:

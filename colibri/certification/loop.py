@@ -94,8 +94,7 @@ def supply(loop: UncertainLoop, sizes: AnyArray) -> Supply:
 def congruent(P: AnyArray, X: AnyArray) -> AnyArray:
     """Return XᵀPX; fractions are faster over a common denominator."""
     if P.dtype != object:
-        product: AnyArray = X.T @ P @ X
-        return product
+        return X.T @ P @ X
     (P, below_P), (X, below_X) = whole(P), whole(X)
     below = below_P * below_X * below_X
     fractions: AnyArray = np.vectorize(lambda value: Fraction(value, below), otypes=[object])(X.T @ P @ X)

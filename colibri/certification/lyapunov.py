@@ -63,8 +63,7 @@ def _solve(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
 def _vectors(matrices: Array) -> Array:
     """Return the upper triangles of (..., k, k), by columns, off-diagonals times √2."""
     columns, rows = np.tril_indices(matrices.shape[-1])
-    vectors: Array = matrices[..., rows, columns] * np.where(rows == columns, 1.0, np.sqrt(2.0))
-    return vectors
+    return matrices[..., rows, columns] * np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 _LEAST_MARGIN = 1e-6  # smallest decrease of a Lyapunov function about the identity

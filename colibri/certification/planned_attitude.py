@@ -201,5 +201,4 @@ def _mirrored(rows: Array) -> Array:
     """Drop entries of (3, 12) that are not their own mirror image."""
     signs = np.array(MIRRORS)
     own = (signs[:, _MOMENTS, None] * signs[:, None, :] == 1).all(axis=0)
-    kept: Array = np.where(own, rows, 0.0)
-    return kept
+    return np.where(own, rows, 0.0)

@@ -271,8 +271,7 @@ def table(found: Certificate, law: PlannedAttitude, flown: FlownErrors) -> list[
 def _relative(weight: Array, other: Array) -> Array:
     values, vectors = np.linalg.eigh(other)
     seen = vectors[:, values > _SEEN * values[-1]]
-    found: Array = eigh(seen.T @ weight @ seen, seen.T @ other @ seen, eigvals_only=True)
-    return found
+    return eigh(seen.T @ weight @ seen, seen.T @ other @ seen, eigvals_only=True)
 
 
 def _ranges(what: str, entry: ProofEntry, law: PlannedAttitude) -> tuple[str, ...]:

@@ -109,8 +109,7 @@ class FlightKind(NamedTuple):
 
 def _direction(rng: np.random.Generator, length: float) -> Array:
     direction = rng.normal(size=3)
-    scaled: Array = length * direction / np.linalg.norm(direction)
-    return scaled
+    return length * direction / np.linalg.norm(direction)
 
 
 def _fast(rng: np.random.Generator) -> dict[str, float]:

@@ -58,8 +58,7 @@ class Picture:
         self._path.set_data_3d(*np.array(self._trail).T)
         self._arms.set_data_3d(*(self._star @ np.array(rotation_matrix((qw, qx, qy, qz))).T + (x, y, z)).T)
         self._canvas.draw()
-        pixels: NDArray[np.uint8] = np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
-        return pixels
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def close(self) -> None: ...
 

@@ -44,19 +44,16 @@ class Flown:
     @property
     def upright(self) -> Array:
         """Cosine of the tilt, (n,)."""
-        cosine: Array = np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
-        return cosine
+        return np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
 
     @property
     def tilt_deg(self) -> Array:
         """Angle between the body's z axis and the vertical, (n,)."""
-        angle: Array = np.degrees(np.arccos(np.clip(self.upright, -1.0, 1.0)))
-        return angle
+        return np.degrees(np.arccos(np.clip(self.upright, -1.0, 1.0)))
 
     @property
     def settled(self) -> NDArray[np.bool_]:
-        after: NDArray[np.bool_] = self.t >= SETTLED_AFTER_S - _SAMPLE_TIME_S
-        return after
+        return self.t >= SETTLED_AFTER_S - _SAMPLE_TIME_S
 
     @property
     def rms_m(self) -> float:
@@ -109,8 +106,7 @@ def _top_speed(plan: FlightPlan, log: TopicReader, t: Array) -> Array:
         return np.full_like(t, vehicle.rotors.max_speed)
     time_s, voltage_v = read_series(log, TRUTH, "t", "voltage_v")
     voltage_v[0] = vehicle.battery.full_voltage_v  # not known before the first step
-    speed: Array = vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
-    return speed
+    return vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
 
 
 COLORS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")

@@ -57,15 +57,13 @@ def thrust_arrows(airframe: VehicleShape, rotors: PerRotor, scale: float) -> Arr
 def segments(points: Array) -> NDArray[np.float32]:
     """Join points (n, 3) to segments; non-finite points interrupt the line."""
     joined = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-    whole: NDArray[np.float32] = joined[np.isfinite(joined).all(axis=(1, 2))]
-    return whole
+    return joined[np.isfinite(joined).all(axis=(1, 2))]
 
 
 def thinned(points: Array, most: int) -> Array:
     """Return at most `most` + 1 of points (n, 3), with the last."""
     step = -(-len(points) // most) if len(points) > most else 1
-    kept: Array = points[::-1][::step][::-1]
-    return kept
+    return points[::-1][::step][::-1]
 
 
 def zone_segments(zone: Zone, bottom_m: float, top_m: float) -> NDArray[np.float32]:

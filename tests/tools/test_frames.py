@@ -18,9 +18,9 @@ from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.service import MAX_STREAMED
 from colibri.mavlink.wire.dialect import mav
+from colibri.sitl.ground_station import Station
 from tools.frames import REQUESTS, in_the_air, sets
-from tools.fuzz.vehicle import BareFlight
-from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
+from tools.fuzz.vehicle import COMPONENT, SYSTEM, BareFlight
 
 ALL_ARE_USED = """
 import sys
@@ -29,7 +29,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from colibri.autopilot.control.qp import Qp, QpSolver
 from colibri.mavlink.files.folder import Folder
-from tools.frames import Timed
+from tools.frames import fly_frame
 from tools.frames import REQUESTS
 from tools.fuzz.vehicle import BareFlight
 
@@ -39,11 +39,10 @@ with TemporaryDirectory() as folder:
     before = set(sys.modules)
     for solver in solvers:  # an infeasible QP
         solver.solve(Qp(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0])))
-    timed = Timed(flight)
     for name in REQUESTS:
         if "32 stations" not in name and name != "each parameter alone":
             for messages in REQUESTS[name](flight):
-                timed.send(messages)
+                fly_frame(flight, messages)
 print(*set(sys.modules) - before)
 """
 
@@ -128,7 +127,7 @@ def test_a_frame_streams_few_messages(counted: Counted) -> None:
 def test_a_flood_does_not_lock_out_other_stations(flood: str) -> None:
     flight = BareFlight()
     in_the_air(flight)
-    other = flight.add(HarnessClient(system=254, port=20_000))
+    other = flight.add(Station, 254)
     datagram = max((b"".join(messages)[:4096] for messages in REQUESTS[flood](flight)), key=len)
     parameter = next(each for each in flight.copter.parameters if each.name == "VEH_MASS")
     for frame in range(150):

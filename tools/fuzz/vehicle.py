@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import hypot
 from statistics import median
 from traceback import format_exc
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import psutil
@@ -18,9 +18,10 @@ from colibri.autopilot.commander.rules.modes import MANUAL, Mode, State, custom_
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import Copter, copter_autopilot
+from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.types import Vector
+from colibri.common.types import Address, Vector
 from colibri.flights.flight import Direct, SteppedFlight
 from colibri.mavlink.files.tree import Files
 from colibri.mavlink.hil.feedback import Feedback
@@ -33,11 +34,15 @@ from colibri.plant.physics.world import starting_world
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
+from colibri.sitl.backends.link_faults import Trouble
+from colibri.sitl.ground_station import Station
 from colibri.sitl.stepping import Steered, Stepped
 from colibri.sitl.vehicle import FORCE
 from tools.fuzz.messages import COMMANDS, SENSIBLE, Messages, Sent, asked
-from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
+SYSTEM, COMPONENT = 1, 1  # of the vehicle
+_FIRST_PORT = 14550
+StationT = TypeVar("StationT", bound=Station)
 STANDING = Start()  # on its feet: z counts from where the vehicle stands
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 _AS_IT_IS = load_profile("flight")
@@ -46,19 +51,20 @@ _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simul
 
 
 class BareFlight(Stepped, Steered):
+    """Plant and autopilot without the codec between them, and ground stations; nothing is recorded."""
+
     system = SYSTEM
 
     def __init__(self, files: Files | None = None) -> None:
         self._vehicle = load_vehicle(_PROFILE.simulation.vehicle)
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=DEFAULT_ORIGIN, files=files)
-        self.client = HarnessClient()
-        self._clients: list[HarnessClient] = []
+        self._stations: list[Station] = []
         autopilot = self._new_autopilot()
         builder = PlantBuilder(WorldSpec(), self._vehicle, {Feedback.STATE: STANDING}, origin=DEFAULT_ORIGIN)
         self.plant = builder.build(Feedback.STATE, autopilot.frame_interval_us)
         self._flight = SteppedFlight(self.plant, autopilot, Direct())
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
-        self.add(self.client)
+        self.client = self.add(Station, 255)
         self.step()
         self.step()
 
@@ -79,15 +85,17 @@ class BareFlight(Stepped, Steered):
         x, y, z = self.plant.world.state[6:9]
         return (x, y, z)
 
-    def add(self, client: HarnessClient) -> HarnessClient:
-        self._clients.append(client)
-        self.copter.stations.hub.open(client.link, client.address)
-        return client
+    def add(self, kind: type[StationT], system: int) -> StationT:
+        number = len(self._stations)
+        station = kind(self, number, system=system, component=190, trouble=Trouble(), seed=0, beats=False)
+        self._stations.append(station)
+        self.copter.stations.hub.open(0, _address(station))
+        return station
 
     def restart(self) -> None:
         self._flight = SteppedFlight(self.plant, self._new_autopilot(), Direct())
-        for client in self._clients:
-            self.copter.stations.hub.open(client.link, client.address)
+        for station in self._stations:
+            self.copter.stations.hub.open(0, _address(station))
 
     def _new_autopilot(self) -> Autopilot[Copter]:
         return copter_autopilot(_PROFILE, self._vehicle, self._settings, lambda: 0.0, strict=True)
@@ -96,32 +104,32 @@ class BareFlight(Stepped, Steered):
         self.plant.world = starting_world(start, self._vehicle)._replace(time_us=self.time_us)
 
     def step(self) -> None:
-        sample = self._flight.step([received for client in self._clients for received in client.take_sent()])
+        now_us = self.time_us
+        sample = self._flight.step(
+            Received(datagram, 0, _address(station))
+            for station in self._stations
+            for datagram in station.departing(now_us)
+        )
         self.rotors = sample.command
-        for link, address, datagram in sample.to_stations:
-            for client in self._clients:
-                if (client.link, client.address) == (link, address):
-                    client.receive(datagram)
+        for station in self._stations:
+            for _, address, datagram in sample.to_stations:
+                if address == _address(station):
+                    station.arriving(datagram, now_us)
+            station.listen(now_us)
 
     def send(self, name: str, *fields: Any) -> None:
         self.client.send(name, *fields)
 
-    def command(self, number: int, *params: float) -> int:
-        """Send a COMMAND_LONG; return the MAV_RESULT. Missing parameters are 0."""
-        before = len(self.client.acks)
-        values = (*params, *(0.0,) * (7 - len(params)))
-        self.send("COMMAND_LONG", SYSTEM, COMPONENT, number, 0, *values)
-        self.wait_until(lambda: len(self.client.acks) > before, within=0.1, what=f"COMMAND_ACK of {number}")
-        self.step()
-        (ack,) = self.client.acks[before:]
-        return int(ack.result)
+
+def _address(station: Station) -> Address:
+    return "127.0.0.1", _FIRST_PORT + station.number
 
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)  # falling: a vehicle at rest has landed
 _MAX_REFERENCE_M_S = 60.0
 _MAX_DISTANCE_M, _MAX_HOME_DISTANCE_M = 2_000.0, 101_000.0
 _ACK = mav.MAVLINK_MSG_ID_COMMAND_ACK
-_PORTS = (17001, 17002, 14540)
+_PLACES = 3  # from which it is fired at
 _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 _WAYPOINT = MissionItem(_FRAME, mav.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, 473977420, 85456100, 12.0)
 _LOITER = _WAYPOINT._replace(command=mav.MAV_CMD_NAV_LOITER_TURNS, p1=1.0, p3=5.0)
@@ -139,16 +147,16 @@ class BrokenError(AssertionError):
     """A condition is violated."""
 
 
-class Shooter(HarnessClient):
-    """A client that decodes acknowledgements only, for speed."""
+class Shooter(Station):
+    """A station that decodes acknowledgements only, for speed."""
 
-    def receive(self, datagram: bytes) -> None:
+    def arriving(self, datagram: bytes, now_us: int) -> None:
         at = 0
         while at < len(datagram):
             assert datagram[at] == MARKER, "the vehicle sends MAVLink 2 alone, but for what it forwards"
             end = at + 12 + datagram[at + 1] + (13 if datagram[at + 2] else 0)
             if int.from_bytes(datagram[at + 7 : at + 10], "little") == _ACK:
-                super().receive(datagram[at:end])
+                super().arriving(datagram[at:end], now_us)
             at = end
 
 
@@ -160,8 +168,8 @@ class FuzzedVehicle:
         self.messages = Messages(chance, [parameter.name for parameter in self.flight.copter.parameters], COMMANDS)
         self.sent: Counter[State] = Counter()
         self.accepted: Counter[int] = Counter()
-        self._shooters = [self.flight.add(Shooter(port=port)) for port in _PORTS]
-        self._unanswered: list[list[Sent]] = [[] for _ in _PORTS]
+        self._shooters = [self.flight.add(Shooter, 255) for _ in range(_PLACES)]
+        self._unanswered: list[list[Sent]] = [[] for _ in range(_PLACES)]
 
     def shoot(self, sent: Sent, place: int) -> None:
         self._shooters[place].send_raw(sent.frame)
@@ -232,7 +240,7 @@ class FuzzedVehicle:
             self.flight.client.acks.clear()
 
     def _order(self, number: int, *params: float) -> None:
-        result = self.flight.command(number, *params)
+        result = self.flight.client.order(number, *params)
         _must(result == ACCEPTED, f"{number} {params}: {result}")
         self.flight.client.acks.clear()
 
@@ -252,8 +260,8 @@ def check(flight: BareFlight) -> None:
     _must(all(0.0 <= control <= 1.0 for control in controls), f"rotors commanded to {controls}")
     _must(flight.rotors.armed or not any(controls), "a rotor turns while disarmed")
     _must(pilot.state.mode in Mode, "no mode of the table")
-    mode = mode_of_custom(flight.client.latest("HEARTBEAT").custom_mode)
-    _must(mode is not None, "no mode of the table is reported")
+    modes = [mode_of_custom(beat.custom_mode) for beat in flight.client.heard["HEARTBEAT"]]
+    _must(None not in modes, "no mode of the table is reported")
     reference = pilot.generator.reference
     _must(reference is not None, "there is always a reference")
     assert reference is not None
@@ -327,7 +335,7 @@ def _fire(target: FuzzedVehicle, situation: State, chance: random.Random, quota:
     sent = 0
     while sent < quota and not target.lost:
         for _ in range(min(_A_FRAME, quota - sent)):
-            target.shoot(target.messages.any(), chance.randrange(3))
+            target.shoot(target.messages.any(), chance.randrange(_PLACES))
             sent += 1
         target.step()
     return sent

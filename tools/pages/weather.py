@@ -76,8 +76,7 @@ def _dryden(intensity: Intensity, axis: int, hz: Array) -> Array:
     sigma, length_m = (scale.sigma_w_m_s, scale.length_w_m) if axis == 2 else (scale.sigma_uv_m_s, scale.length_uv_m)
     squared = (2.0 * pi * hz * length_m / _WIND.speed_m_s) ** 2
     shape = (1.0 + 3.0 * squared) / (1.0 + squared) ** 2 if axis == 2 else 2.0 / (1.0 + squared)
-    spectrum: Array = 2.0 * sigma**2 * length_m / _WIND.speed_m_s * shape
-    return spectrum
+    return 2.0 * sigma**2 * length_m / _WIND.speed_m_s * shape
 
 
 def write(folder: Path) -> None:
