@@ -12,6 +12,7 @@ from math import hypot, inf
 from time import perf_counter
 from typing import Any, NamedTuple
 
+from colibri.analysis.tables import markdown
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.feedback import Feedback
@@ -244,26 +245,26 @@ def main() -> int:
         cases.append(case)
         if case["bad"]:
             print(f"FAILED: {case}", flush=True)
-    print(*table(cases), "", sep="\n")
+    print(table(cases))
     flown = sum(case["outcome"] != "not reached" for case in cases)
     failed = sum(case["bad"] for case in cases)
     print(f"{flown} flights with exceptions thrown, {failed} failed; {perf_counter() - started_s:.0f} s")
     return 1 if failed or not flown else 0
 
 
-def table(cases: list[dict[str, Any]]) -> list[str]:
+def table(cases: list[dict[str, Any]]) -> str:
     outcomes: dict[str, dict[str, Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
     said: dict[str, Counter[str]] = defaultdict(Counter)
     for case in cases:
         if case["outcome"] != "not reached":
             outcomes[case["place"]][case["situation"]][case["outcome"]] += 1
             said[case["place"]][case["said"]] += 1
-    lines = [f"| place | {' | '.join(SITUATIONS)} | said |", "|---" * (len(SITUATIONS) + 2) + "|"]
+    rows = []
     for place, row in outcomes.items():
-        cells = [", ".join(f"{n} {what}" for what, n in sorted(row[name].items())) or "–" for name in SITUATIONS]
+        cells = (", ".join(f"{n} {what}" for what, n in sorted(row[name].items())) or "–" for name in SITUATIONS)
         ((text, _),) = said[place].most_common(1)
-        lines.append(f"| `{place.partition(':')[2]}` | {' | '.join(cells)} | {text} |")
-    return lines
+        rows.append((f"`{place.partition(':')[2]}`", *cells, text))
+    return markdown(("place", *SITUATIONS, "said"), rows, names=len(SITUATIONS) + 2)
 
 
 def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.analysis.tables import markdown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.verification.verify import FOUND
 
@@ -211,10 +212,9 @@ def table(flown: Mapping[str, GoldenHashes]) -> str:
     names = list(flown)
     flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
     differing = {name: each.differing() for name, each in flown.items()}
-    rows = [["flight", *names], ["---", *("---" for _ in names)]]
-    rows += [[flight, *("**differs**" if flight in differing[name] else "=" for name in names)] for flight in flights]
-    rows.append(["took", *(f"{each.took_s:.0f} s" for each in flown.values())])
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+    rows = [(flight, *("**differs**" if flight in differing[name] else "=" for name in names)) for flight in flights]
+    rows.append(("took", *(f"{each.took_s:.0f} s" for each in flown.values())))
+    return markdown(("flight", *names), rows, names=1 + len(names))
 
 
 def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:

@@ -18,6 +18,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any, NamedTuple
 
+from colibri.analysis.tables import markdown
 from colibri.common.errors import Error, shown, unknown
 from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.common.process.lifecycle import EXIT_FAILED, handle_endings, interrupt, one_line
@@ -68,8 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def table(outcomes: Sequence[Outcome], version: str) -> str:
     counts = Counter(each.outcome for each in outcomes)
     head = f"ArduPilot {version}: " + ", ".join(f"{counts[each]} {each}" for each in (PASSED, FAILED, LEFT_OUT))
-    rows = [f"| {it.test} | {it.outcome} | {it.reason.replace('|', '/')} |" for it in outcomes]
-    return "\n".join([head, "", "| test | outcome | reason |", "|---|---|---|", *rows, ""])
+    rows = [(it.test, it.outcome, it.reason.replace("|", "/")) for it in outcomes]
+    return f"{head}\n\n{markdown(('test', 'outcome', 'reason'), rows, names=3)}"
 
 
 def version(checkout: Path) -> str:

@@ -1,6 +1,5 @@
 """Observes a vehicle on a separate link."""
 
-from collections import Counter
 from collections.abc import Callable
 from threading import Condition
 from time import monotonic
@@ -11,6 +10,7 @@ from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Vector
 from colibri.mavlink.client.client import Client, Talk, VehicleFound
 from colibri.mavlink.client.commands import Command, set_message_interval
+from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.client.parameters import ReadParameter, SetParameter
 from colibri.mavlink.client.plans import Download
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Message, mav
@@ -44,16 +44,15 @@ class Sight(NamedTuple):
         return self.landed not in (ON_GROUND, mav.MAV_LANDED_STATE_UNDEFINED)
 
 
-class Observer(OnPort):
+class Observer(OnPort, Inbox):
     """Records the messages of a vehicle."""
 
     def __init__(self) -> None:
-        super().__init__(self)
+        OnPort.__init__(self, self)
+        Inbox.__init__(self)
         own = mav.MAV_COMP_ID_MISSIONPLANNER
         self._client = Client(_SYSTEM_ID, own, heartbeat_every_us=None, all_components=True)
         self.sights: list[Sight] = []
-        self.texts: list[str] = []
-        self.counts: Counter[str] = Counter()
         self._latest: dict[str, Any] = {}
         self._modes: list[Mode] = []
         self._news = Condition()
@@ -140,10 +139,8 @@ class Observer(OnPort):
             return self._client.poll(now_us)
 
     def _take(self, message: Message) -> None:
+        self.add(message)
         name, fields = message.name, message.fields
-        self.counts[name] += 1
-        if name == "STATUSTEXT":
-            self.texts.append(fields.text)
         if message.source[1] != AUTOPILOT_COMPONENT:
             return
         self._latest[name] = fields

@@ -1,7 +1,7 @@
 """Table and figure of `rotor-loss.md`: flights that lose a rotor."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
+from colibri.campaigns.engines import in_order
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Array
@@ -38,7 +39,6 @@ COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
 _T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)
 _BLADES_LEFT = 0.001
 _BEFORE_S, _AFTER_S, _MAX_DURATION_S = 1.0, 1.5, 40.0
-_WORKERS = 2
 _LOW_M = 0.3
 _FULL_TURN_DEG = 360.0
 
@@ -109,12 +109,6 @@ def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
     rotor = seed % 4 + 1
     blades_gone = Fault(MOTOR, WRONG, rotor, (_BLADES_LEFT, 0.0, 0.0, 0.0))
     return _lose(flight, seed, Fault(MOTOR, OFF, rotor) if case.runs_down else blades_gone)
-
-
-def fly_all(cases: Iterable[RotorLossCase], seeds: Iterable[int]) -> dict[RotorLossCase, list[RotorLossFlight]]:
-    numbers = list(seeds)
-    with ProcessPoolExecutor(_WORKERS) as pool:
-        return {case: list(pool.map(fly, [case] * len(numbers), numbers)) for case in cases}
 
 
 def _take_off(flight: SteppedFlight[Copter]) -> None:
@@ -239,7 +233,7 @@ def _cells(flown: Sequence[RotorLossFlight]) -> list[str]:
 
 def write(folder: Path) -> bool:
     """Return whether all but the last case went well."""
-    flown = fly_all(CASES, SEEDS)
+    flown = {case: in_order(partial(fly, case), SEEDS, case.name, quiet=False) for case in CASES}
     path = folder / "rotor-loss.md"
     path.write_text(with_tables(path.read_text(encoding="utf-8"), [table(flown)]), encoding="utf-8")
     title = f"A rotor lost at {HEIGHT_M:.0f} m, {len(SEEDS)} seeds: {_DRAWN.name}"

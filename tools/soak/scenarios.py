@@ -16,15 +16,13 @@ WORKERS = 2
 _BUSY = "while True: sum(range(10_000))"
 
 
-class DiffersError(Exception):
-    """Two runs differ."""
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     args = _arguments(argv)
     links = LINKS if args.link == "both" else (args.link,)
     first: dict[str, str] = {}
-    with kept_in(args.keep) as folder, busy(os.cpu_count() or 1 if args.load else 0):
+    with TemporaryDirectory() as own, busy(os.cpu_count() or 1 if args.load else 0):
+        folder = args.keep or Path(own)
+        folder.mkdir(parents=True, exist_ok=True)
         for number, link in zip(range(1, args.runs + 1), cycle(links), strict=False):
             kept = folder / f"{number:04}-{link}"
             if not kept.exists():
@@ -32,26 +30,16 @@ def main(argv: Sequence[str] | None = None) -> int:
                 summary = _run(link, kept, args.only)
                 took_s = perf_counter() - began_s
                 print(f"{number} of {args.runs}, {link}, {took_s:.0f} s: {summary}", flush=True)
-            lines = read(kept)
+            lines = dict(line.split(" ", 1) for line in kept.read_text(encoding="utf-8").splitlines())
             first = first or lines
-            try:
-                compare(first, lines)
-            except DiffersError as error:
-                print(f"run {number}, over {link}: {error}")
-                return 1
+            for test in sorted(first.keys() | lines.keys()):
+                then, now = (outcomes.get(test, "not run") for outcomes in (first, lines))
+                if then != now:
+                    print(f"run {number}, over {link}: {test}: {then} at first, {now} now")
+                    return 1
     failed = sorted(test for test, outcome in first.items() if not outcome.startswith("passed"))
     print(f"{args.runs} runs of {len(first)} tests: no verdict and no hash differs, {len(failed)} failed")
     return 1 if failed else 0
-
-
-def read(kept: Path) -> dict[str, str]:
-    return dict(line.split(" ", 1) for line in kept.read_text(encoding="utf-8").splitlines())
-
-
-def compare(first: dict[str, str], again: dict[str, str]) -> None:
-    for test in sorted(first.keys() | again.keys()):
-        if first.get(test) != again.get(test):
-            raise DiffersError(f"{test}: {first.get(test, 'not run')} at first, {again.get(test, 'not run')} now")
 
 
 def _run(link: str, kept: Path, only: str) -> str:
@@ -65,16 +53,6 @@ def _run(link: str, kept: Path, only: str) -> str:
     hashes.rename(kept)
     summary = [line for line in done.stdout.splitlines() if line.startswith("sitl: ")]
     return summary[-1] if summary else "nothing flown"
-
-
-@contextmanager
-def kept_in(folder: Path | None) -> Iterator[Path]:
-    if folder is None:
-        with TemporaryDirectory() as own:
-            yield Path(own)
-    else:
-        folder.mkdir(parents=True, exist_ok=True)
-        yield folder
 
 
 @contextmanager

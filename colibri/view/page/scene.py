@@ -68,27 +68,21 @@ class VehicleScene:
         _show(self._wind, geometry.arrow(now.position_enu_m, now.wind_enu_m_s, _WIND_S * self._scale), layers, "wind")
         east, north, up = now.position_enu_m
         self._to_ground.points = geometry.segments(np.array([[east, north, ground_m], [east, north, up]]))
-        self._show_reference(now, layers)
-        self._show_estimate(now, layers)
-
-    def remove(self) -> None:
-        self._frame.remove()
-
-    def _show_reference(self, now: Snapshot, layers: frozenset[str]) -> None:
         known = np.isfinite(now.reference_enu_m).all() and "reference" in layers
         self._reference.visible = bool(known)
         if known:
             self._reference.position = now.reference_enu_m
         between = np.array([now.position_enu_m, now.reference_enu_m])
         _show(self._to_reference, geometry.segments(between), layers, "reference")
-
-    def _show_estimate(self, now: Snapshot, layers: frozenset[str]) -> None:
         known = np.isfinite(now.estimate_enu_m).all() and "estimate" in layers
         self._estimate.visible = bool(known)
         if known:
             self._estimate.position = now.estimate_enu_m
             x, y, z = (3.0 * sigma for sigma in now.sigma_m)
             self._estimate.scale = (max(x, 0.01), max(y, 0.01), max(z, 0.01))
+
+    def remove(self) -> None:
+        self._frame.remove()
 
     def _arrows(self, name: str, points: Any, colour: Colour, shaft: float, head: float, length: float) -> Any:
         """Add arrows with radii and the length of the head in radii of a rotor."""
