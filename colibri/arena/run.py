@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, write_figure
 from colibri.analysis.lost import LOST_M
@@ -193,7 +192,7 @@ class ArenaResults(CampaignResults):
         axes.set_ylabel("mean error (mm)")
         axes.set_yscale("log")
         axes.set_ylim(_LEAST_MM, 1.6 * _MM * CAP_M)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter("{x:g}")
 
     def _over_worlds(self, axes: Axes, _name: str, rows: Sequence[Row]) -> None:
         curves = list(self._curves(rows))
@@ -207,7 +206,7 @@ class ArenaResults(CampaignResults):
         axes.set_xlabel("mean error (mm)")
         axes.set_xscale("log")
         axes.set_xlim(_LEAST_MM, 1.6 * _MM * CAP_M)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_major_formatter("{x:g}")
 
     def _curves(self, rows: Sequence[Row]) -> Iterator[tuple[str, str, list[Row]]]:
         """Yield each law with its colour and the rows that it has flown."""

@@ -101,7 +101,6 @@ LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
 _MIN_S = 4.0  # it begins with a second of standing
 _SETTLED = 500  # frames left out: the estimator aligns
-FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 
 def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:

@@ -5,7 +5,6 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
@@ -15,27 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from colibri.analysis.tables import Row, print_table
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench.costs import (
-    AIR,
-    CHANNELS,
-    FLIGHTS_A_RUN,
-    VEHICLES,
-    sensing_figures,
-    serving_figures,
-    simulator_figures,
-)
-from colibri.bench.speed import (
-    COMMANDS,
-    CONTROL_S,
-    LINKS,
-    PeerSimulator,
-    Report,
-    colibri_of,
-    command_figures,
-    rate_figures,
-)
-from colibri.bench.stages import BLOCKS, stage_figures
+from colibri.bench.costs import sensing_figures, serving_figures, simulator_figures
+from colibri.bench.speed import PeerSimulator, Report, colibri_of, command_figures, rate_figures
+from colibri.bench.stages import stage_figures
 from colibri.common.files import regular
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 
@@ -55,11 +36,15 @@ def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
     if args.against:
         colibri_of(args.against)
     figures: dict[str, Any] = {"settings": _settings(args)}
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with (
         one_line(EXIT_FAILED),
-        _progress(parts(wanted, args.runs, beside=peer is not None, against=args.against is not None)) as report,
+        Progress(*columns, console=console, disable=not console.is_terminal) as bar,
         TemporaryDirectory() as folder,
     ):
+        task = bar.add_task("", total=len(wanted))
+        report: Report = lambda what: bar.update(task, description=what)  # noqa: E731
         flown = (load_profile(PROFILE), Path(folder), args.duration)
         measures: dict[str, Callable[[], dict[str, Any]]] = {
             "stages": lambda: stage_figures(*flown, report),
@@ -69,7 +54,9 @@ def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
             "ground": lambda: serving_figures(*flown, args.runs, report),
             "commands": lambda: command_figures(args.duration, args.runs, report, args.against),
         }
-        figures |= {name: measure() for name, measure in measures.items() if name in wanted}
+        for name in (name for name in measures if name in wanted):
+            figures[name] = measures[name]()
+            bar.advance(task)
     if args.out:
         _write(args.out, json.dumps(figures, indent=2, ensure_ascii=False) + "\n")
     for table in _tables(figures):
@@ -80,31 +67,6 @@ def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
     machine = {"python": platform.python_version(), "machine": platform.machine(), "cpus": os.cpu_count()}
     return {"profile": PROFILE, "runs": args.runs, "duration_s": args.duration, **machine}
-
-
-def parts(wanted: list[str], runs: int, *, beside: bool, against: bool = False) -> int:
-    """Count the calls of `report`."""
-    stages = 1 + len(BLOCKS) * (1 + len(installed_solvers()))
-    flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
-    ground = len(CHANNELS) + 2 * runs
-    sensors = 1 + runs * FLIGHTS_A_RUN
-    commands = runs * COMMANDS * (1 + against)
-    simulators = len(VEHICLES) * len(AIR)
-    parts = {"stages": stages, "flights": flights, "sensors": sensors, "simulators": simulators, "ground": ground}
-    return sum((parts | {"commands": commands})[section] for section in set(wanted))
-
-
-@contextmanager
-def _progress(parts: int) -> Iterator[Report]:
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=parts)
-
-        def report(what: str) -> None:
-            bar.update(task, description=what, advance=1)
-
-        yield report
 
 
 def _tables(figures: Mapping[str, Any]) -> Iterator[Table]:

@@ -139,7 +139,6 @@ GOALS = (
     Goal("start, UDP", ("hover",), STARTS_S, START, 1.2),
     Goal("start, memory", ("hover", "--link", "memory"), STARTS_S, START, 0.7),
 )
-COMMANDS = len({goal.name for goal in GOALS})
 
 
 def colibri_of(checkout: Path) -> Path:

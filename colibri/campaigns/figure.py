@@ -173,8 +173,7 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
 
 def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
-    names = [group.name or table.campaign.name for group in groups]
-    make_room_for_names(figure, names)
+    name_rows(figure, [axes], [group.name or table.campaign.name for group in groups])
     for place, group in enumerate(groups):
         some = _flown(table, values, group.places)
         color = COLORS[place % len(COLORS)]
@@ -184,19 +183,25 @@ def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Gr
         lost, _, refused = table.lost(group.places)
         said = ", ".join(f"{count} {what}" for count, what in ((lost, "lost"), (refused, "refused")) if count)
         axes.text(0.99, -place, said, transform=axes.get_yaxis_transform(), ha="right", va="center", color=_LOST)
-    axes.set_yticks([-place for place in range(len(groups))], names)
-    axes.set_ylim(-len(groups) + 0.4, 0.6)
     if _is_wide(values):
         axes.set_xscale("log")
     axes.set_xlabel(f"{label_of(metric)}; bars: medians")
-    axes.grid(axis="x", **GRID)
     put_title(figure, _title(table))
     return figure
 
 
 def make_room_for_names(figure: Figure, names: Iterable[str]) -> None:
-    left_in = 0.3 + _CHARACTER_IN * max(map(len, names))
+    left_in = 0.3 + _CHARACTER_IN * max(len(line) for name in names for line in name.split("\n"))
     figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
+
+
+def name_rows(figure: Figure, panels: Iterable[Axes], names: Sequence[str]) -> None:
+    """Name the rows of panels, at y = 0, -1, ..., with a grid across them."""
+    make_room_for_names(figure, names)
+    for axes in panels:
+        axes.set_yticks([-place for place in range(len(names))], names)
+        axes.set_ylim(-len(names) + 0.4, 0.6)
+        axes.grid(axis="x", **GRID)
 
 
 def _is_wide(values: Array) -> bool:

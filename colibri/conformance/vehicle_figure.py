@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator
 
-from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head
-from colibri.campaigns.figure import make_room_for_names
+from colibri.analysis.figures import TOP_IN, axes_grid, put_head
+from colibri.campaigns.figure import name_rows
 from colibri.conformance.subject import Result
 from colibri.conformance.vehicle_flights import MAX_FACTOR, Bound, Tolerance
 
@@ -20,7 +20,7 @@ _TICKS = (0.25, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0)
 def draw_tolerances(title: str, tolerances: Sequence[Tolerance]) -> Figure:
     """Draw a bar for each number, from the smallest to the largest ratio of file and truth."""
     figure, ((axes,),) = axes_grid(1, 1, TOP_IN, row_in=0.3 + _BAR_IN * len(tolerances))
-    make_room_for_names(figure, [each.name for each in tolerances])
+    name_rows(figure, [axes], [each.name for each in tolerances])
     for place, (_, least, most) in enumerate(tolerances):
         result = tolerances[place].result
         label = "near a limit" if result is Result.NEAR else "flown"
@@ -33,9 +33,7 @@ def draw_tolerances(title: str, tolerances: Sequence[Tolerance]) -> Figure:
     axes.set_xticks(_TICKS, [f"{tick:g}" for tick in _TICKS])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks([-place for place in range(len(tolerances))], [each.name for each in tolerances])
     axes.set_xlabel("number in the file / true number")
-    axes.grid(axis="x", **GRID)
     axes.set_axisbelow(True)
     put_head(figure, f"{title}: how wrong each number may be")
     return figure

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from colibri.analysis.estimation import MEASURED, NAVIGATION, bounds
-from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
+from colibri.analysis.figures import TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.recording import SETTLED_AFTER_S
-from colibri.campaigns.figure import make_room_for_names
+from colibri.campaigns.figure import name_rows
 from colibri.campaigns.flight_table import FlightTable
 
 _LABEL_IN = 0.8
@@ -51,24 +51,21 @@ def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
     figure, grid = axes_grid(rows, 1, TOP_IN, row_in=row_in + _LABEL_IN, share=False)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
-    make_room_for_names(figure, names)
+    name_rows(figure, [axes for (axes,) in grid], names)
     figure.subplots_adjust(hspace=_LABEL_IN / row_in)
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
         for number, (quantity, (color, called)) in enumerate(quantities.items()):
             _strips(axes, table, quantity, color, called, _shift(number, len(quantities)))
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=_MAX_DECADES))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(label, loc="right")
     if estimated:
         _draw_nees(grid[-2][0], table)
         _draw_nis(grid[-1][0], table)
     for (axes,) in grid:
-        axes.set_yticks([-place for place in range(len(cases))], names)
-        axes.set_ylim(-len(cases) + 0.45, 0.55)
         axes.tick_params(labelbottom=True)
-        axes.grid(axis="x", **GRID)
         if axes.get_legend_handles_labels()[1]:
             where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
             axes.legend(**where, ncols=len(MEASURED), frameon=False)

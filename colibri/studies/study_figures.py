@@ -18,6 +18,7 @@ from colibri.analysis.outcome import fly_to_its_end
 from colibri.analysis.recording import ROTORS, SETTLED_AFTER_S, Recording, read_recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, Active, Fallback
 from colibri.campaigns.definition import Point
+from colibri.campaigns.figure import name_rows
 from colibri.campaigns.flights import Common, plan_point
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
@@ -131,7 +132,7 @@ class StudyResult(NamedTuple):
 def tracks(results: Sequence[StudyResult]) -> dict[str, Figure]:
     names = _names(result.row[0] for result in results)
     figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.62 * len(names))
-    figure.subplots_adjust(left=0.17)
+    name_rows(figure, [axes], names)
     _compare(axes, [(result, result.row[0]) for result in results])
     put_head(figure, "Position error, track by track", columns=3)
     return {"tracks": figure}
@@ -163,9 +164,6 @@ def _compare(axes: Axes, named: Sequence[tuple[StudyResult, str]]) -> None:
             axes.text(0.99, place, "lost", transform=axes.get_yaxis_transform(), ha="right", va="center", color=color)
     axes.plot([], [], "k|", markersize=10, markeredgewidth=1.8, label="maximum")
     axes.set_xscale("log")
-    axes.set_yticks([-place for place in range(len(names))], names)
-    axes.set_ylim(-len(names) + 0.5, 0.5)
-    axes.grid(axis="x", **GRID)
     axes.set_xlabel(f"position error after {SETTLED_AFTER_S:.0f} s (m)")
 
 
@@ -200,7 +198,7 @@ def robustness(results: Sequence[StudyResult]) -> dict[str, Figure]:
     on = _names(result.row[0] for result in results)
     plants = _names(result.row[1] for result in results)
     figure, grid = axes_grid(len(on), 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.55 * len(plants))
-    figure.subplots_adjust(left=0.26)
+    name_rows(figure, [axes for (axes,) in grid], [plant.replace(", ", ",\n") for plant in plants])
     for track, (axes,) in zip(on, grid, strict=True):
         named = [(result, result.row[1].replace(", ", ",\n")) for result in results if result.row[0] == track]
         _compare(axes, named)

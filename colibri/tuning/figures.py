@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, round_ticks
 from colibri.campaigns.factors import Choice, LogUniform, shown
-from colibri.campaigns.figure import COLORS, make_room_for_names, scale_values
+from colibri.campaigns.figure import COLORS, name_rows, scale_values
 from colibri.tuning.definition import Range
 from colibri.tuning.trials import FinishedTrial
 
@@ -34,17 +34,15 @@ def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) 
     names = sorted(first, key=lambda name: -first[name])
     figure, ((axes,),) = axes_grid(1, 1, TOP_IN, row_in=0.3 + _BAR_IN * len(names) * len(importances))
     short = short_names(names)
-    make_room_for_names(figure, short.values())
+    name_rows(figure, [axes], [short[name] for name in names])
     height = 0.8 / len(importances)
     for place, (objective, parts) in enumerate(importances.items()):
         at = -np.arange(len(names)) + 0.4 - height * (place + 0.5)
         widths = [100.0 * parts[name] for name in names]
         bars = axes.barh(at, widths, height, color=COLORS[place % len(COLORS)], label=objective)
         axes.bar_label(bars, fmt="%.0f %%", padding=3)
-    axes.set_yticks(-np.arange(len(names)), [short[name] for name in names])
     axes.set_xlim(0.0, 1.12 * max(100.0 * max(parts.values()) for parts in importances.values()) or 1.0)
     axes.set_xlabel("importance for being in the best quarter of trials (%), PED-ANOVA")
-    axes.grid(axis="x", **GRID)
     axes.set_axisbelow(True)
     put_head(figure, title, columns=min(len(importances), 2))
     return figure

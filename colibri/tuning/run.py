@@ -176,11 +176,10 @@ def tune(
     require_optuna()
     tuning = tuning_of(tables_of(TuningTables, file, tables))
     checked("out", out, (str, PurePath, NoneType), "a folder", TuningError)
-    if out is not None:
-        return fly_tuning(tuning, lambda: engine_of(workers, executor), Path(out), resume=resume, watcher=watcher)
-    with TemporaryDirectory(prefix="colibri-") as folder:
+    with TemporaryDirectory(prefix="colibri-") as own:
+        folder, keep = Path(own) / "tune" if out is None else Path(out), out is not None
         return fly_tuning(
-            tuning, lambda: engine_of(workers, executor), Path(folder) / "tune", watcher=watcher, keep=False
+            tuning, lambda: engine_of(workers, executor), folder, resume=resume, watcher=watcher, keep=keep
         )
 
 

@@ -44,7 +44,6 @@ class AutopilotKill(NamedTuple):
 class KilledMission(NamedTuple):
     kills: list[AutopilotKill]
     flown: bool
-    duration_s: float
     words: str
 
 
@@ -109,8 +108,7 @@ def fly_autopilots(folder: Path, feedback: Feedback, seed: int, max_kills: int, 
             kills.append(_Killed(died_us * 1e-6, phase, item, is_said()))
         between.fly_until(station, lambda: station.flown, "the end of the mission")
     words = "".join(process.errors() for process in processes)
-    truth = topic_rows(folder)
-    return KilledMission(judged(truth, kills), station.flown, float(truth["t"][-1]), words)
+    return KilledMission(judged(topic_rows(folder), kills), station.flown, words)
 
 
 def start(folder: Path, url: str, station: KillStation, feedback: Feedback) -> Process:

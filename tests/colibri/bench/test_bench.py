@@ -100,19 +100,18 @@ def test_the_estimator_and_sensor_flights_are_timed(tmp_path: Path) -> None:
 
 def test_the_plant_is_timed_as_a_simulator_of_others(tmp_path: Path) -> None:
     exchanges = figures_of(tmp_path / "simulators.json", "--only", "simulators")["simulators"]["exchange_us"]
-    assert len(exchanges) == len(costs.VEHICLES) * len(costs.AIR) == run.parts(["simulators"], 1, beside=False)
+    assert len(exchanges) == len(costs.VEHICLES) * len(costs.AIR)
     for name, figure in exchanges.items():
         frames_hz = costs.FRAMES_HZ[name.partition(",")[0]]
         assert 0.0 < figure["p50"] <= figure["p99"]
         assert figure["samples"] == pytest.approx(float(SHORT_S) * frames_hz, abs=110)
 
 
-def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[str] = []
+def test_a_peer_is_measured_at_every_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
-    profile = load_profile(run.PROFILE)
-    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, speed.PeerSimulator("rotorpy", lambda *_: 1.0))
-    assert len(told) == run.parts(["flights"], 2, beside=True)
+    profile, peer = load_profile(run.PROFILE), speed.PeerSimulator("rotorpy", lambda *_: 2.0)
+    figures = speed.rate_figures(profile, tmp_path, 0.1, 2, lambda _what: None, peer)
+    assert all(rate["udp / rotorpy"]["median"] == 0.5 for rate in figures["rates_hz"].values())
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
