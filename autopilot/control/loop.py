@@ -53,6 +53,7 @@ class Seen(NamedTuple):
     acceleration_enu_m_s2: Vector
 
 
+_ON_SENSORS_S = 0.02  # the estimator does not start with frames further apart than 0.05 s
 _UNSEEN = Seen(-1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -69,7 +70,15 @@ class LoopRecord(NamedTuple):
 class ControlLoop:
     """One control law flying one vehicle."""
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
+    def __init__(
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        clock: Clock,
+        law: Factory | None = None,
+        *,
+        on_sensors: bool = False,
+    ) -> None:
         self._name = profile.controller
         self.controller = build_controller(profile, vehicle, clock, law)
         if isinstance(self.controller, CompiledController):
@@ -81,7 +90,8 @@ class ControlLoop:
         self.plan_columns = self.controller.plan_columns if isinstance(self.controller, PlanController) else None
         self._take_in(self.controller)
         self.control_interval_us = self.controller.control_interval_us
-        self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)  # divides the control interval
+        wanted_s = profile.simulation.frame_interval_s or (_ON_SENSORS_S if on_sensors else None)
+        self.frame_interval_us = _frame_interval_us(wanted_s, self.control_interval_us)  # divides the control interval
         self._memory: Any = None
         self._waited_us = 0
         self._reported_ah = 0.0
@@ -246,8 +256,7 @@ class ControlLoop:
             self._speeds = tuple([now + (to - now) * (up if to > now else down) for now, to in moving])
 
 
-def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    wanted_s = profile.simulation.frame_interval_s
+def _frame_interval_us(wanted_s: float | None, control_interval_us: int) -> int:
     if wanted_s is None:
         return control_interval_us
     control_ms, wanted_ms = control_interval_us // 1000, round(wanted_s * 1e6) // 1000

@@ -31,7 +31,7 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
     rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)] | None = None
     """Initial speed of every rotor, rpm. Without it, the hover speed."""
     frame_interval_s: ControlInterval | None = None
-    """Largest interval between plant frames; a divisor of the control interval, which is the default."""
+    """Largest interval between plant frames, a divisor of the control interval; by default that, on sensors 0.02."""
 
     def rotor_speed(self, vehicle: Vehicle) -> float:
         """Return the rotor speed at the start, in the vehicle's unit."""

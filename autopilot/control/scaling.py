@@ -12,7 +12,7 @@ ratios give the numbers to which the laws were tuned on the Hummingbird. In the 
 """
 
 from collections.abc import Callable, Mapping
-from math import sqrt
+from math import floor, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -181,7 +181,7 @@ def scaled(law: str, table: Mapping[str, Any], vehicle: Vehicle) -> dict[str, An
     ratios, can = read_settings(table["scaling"], kind), capability_of(vehicle)
     if can.thrust < _LEAST_THRUST:
         raise SettingsError(
-            f'vehicle "{vehicle.name}": the largest thrust is {can.thrust:.3g} times the weight: '
+            f'vehicle "{vehicle.name}": the largest thrust is {floor(100.0 * can.thrust) / 100.0:g} times the weight: '
             f"at least {_LEAST_THRUST} is required"
         )
     for key, row in rows.items():

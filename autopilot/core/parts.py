@@ -73,7 +73,7 @@ def parts_of(
     parameters.load(values or {})
     flown, assumed = numbers.applied(parameters.values)
     flies_by = behaviour(parameters)
-    loop = ControlLoop(flown, assumed, clock)
+    loop = ControlLoop(flown, assumed, clock, on_sensors=estimator is not None)
     limits = attitude_limits(flies_by, free=loop.tilts_freely)
     attitude = AttitudeReference(assumed, loop.preview, limits) if loop.takes_attitude else None
     planned_at = instants(loop.preview, loop.control_interval_us)

@@ -45,7 +45,7 @@ def track_autopilot(
     Raises:
         AutopilotError: The profile's control law, table or solver cannot be used.
     """
-    loop = ControlLoop(profile, vehicle, clock, law)
+    loop = ControlLoop(profile, vehicle, clock, law, on_sensors=estimator is not None)
     state_source = StateSource(estimator, loop.frame_interval_us)
     delay = DelayCompensation(vehicle, profile.delay_s)
     planner = Planner(track, profile.references, loop.preview)

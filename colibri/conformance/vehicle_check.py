@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import isnan
+from math import floor, isnan
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -184,7 +184,7 @@ def _limits(vehicle: Vehicle, table: Mapping[str, Any]) -> Iterator[Check]:
 
 def _thrust(name: str, ratio: float) -> Check:
     result = Result.FAILED if ratio < _LEAST_THRUST else Result.NEAR if ratio < _LITTLE_THRUST else Result.OK
-    return Check(name, result, ratio, _LITTLE_THRUST, _LEAST_THRUST, "")
+    return Check(name, result, floor(100.0 * ratio) / 100.0, _LITTLE_THRUST, _LEAST_THRUST, "")
 
 
 def _flights(flown: Mapping[str, Flown]) -> Iterator[Check]:

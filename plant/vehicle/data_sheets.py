@@ -8,7 +8,7 @@ import csv
 import io
 import tomllib
 from itertools import pairwise
-from math import isfinite, pi, radians, sqrt
+from math import floor, isfinite, pi, radians, sqrt
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -168,8 +168,8 @@ def vehicle_file(sheet: DataSheet) -> tuple[str, list[str]]:
     ratio, hover = max_n / weight_n, sqrt(weight_n / (sheet.rotors * rotor.coefficient))
     if ratio < _MIN_THRUST_TO_WEIGHT:
         raise VehicleError(
-            f"largest thrust {max_n:.3g} N is {ratio:.2f} times the weight: at least {_MIN_THRUST_TO_WEIGHT} is"
-            " required (look at --mass, --propeller, --kv, --cells)"
+            f"largest thrust {max_n:.3g} N is {floor(100.0 * ratio) / 100.0:g} times the weight: at least"
+            f" {_MIN_THRUST_TO_WEIGHT} is required (look at --mass, --propeller, --kv, --cells)"
         )
     text = _template(sheet).format(**_numbers(sheet, rotor, hover)) + _sensors()
     try:

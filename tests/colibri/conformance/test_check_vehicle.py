@@ -24,6 +24,10 @@ def with_thrust(ratio: float) -> Vehicle:
     return vehicle.replace("body.mass_kg", float(vehicle.max_wrench()[0]) / vehicle.gravity_m_s2 / ratio)
 
 
+def test_a_law_of_ten_hertz_flies_on_sensors() -> None:
+    assert fly(HUMMINGBIRD, TRIALS["sensors"], {"profile": "thesis"}).error_m < 0.6
+
+
 @pytest.mark.parametrize("trial", ["lemniscate", "empty battery"])
 def test_the_hummingbird_flies(trial: str) -> None:
     flown = fly(HUMMINGBIRD, TRIALS[trial], LAW)
@@ -35,6 +39,7 @@ def test_a_vehicle_that_lifts_little_more_than_itself_flies_but_carries_nothing(
     weak = with_thrust(1.08)
     assert fly(weak, TRIALS["hover"], LAW) == ("", 0.0, 0.0)
     assert fly(weak, TRIALS["hover"], {"profile": "se3"}).error_m < 1e-3  # on the track, wherever the profile starts
+    assert "is 1.04 times the weight: at least 1.05" in fly(with_thrust(1.0499), TRIALS["hover"], LAW).lost
     assert fly(weak, TRIALS["10 % more mass"], LAW).lost.startswith("refused: rotors.max_speed")
 
 
