@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.analysis.tables import markdown
+from colibri.common.process.arguments import chosen
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.verification.verify import FOUND
 
@@ -203,7 +204,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if args.pythons:
             _set_up_pythons()
-        return _fly_all(_chosen(args), args)
+        return _fly_all(_wanted(args), args)
     except KeyboardInterrupt as ended:
         fail_interrupted(ended)
 
@@ -217,10 +218,10 @@ def table(flown: Mapping[str, GoldenHashes]) -> str:
     return markdown(("flight", *names), rows, names=1 + len(names))
 
 
-def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:
+def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
     flown: dict[str, GoldenHashes] = {}
     failed = False
-    for variation in chosen:
+    for variation in wanted:
         obstacle = variation.obstacle()
         if obstacle:
             print(f"{variation.name}: not flown: {obstacle}", flush=True)
@@ -243,14 +244,10 @@ def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:
     return EXIT_FAILED if failed else 0
 
 
-def _chosen(args: argparse.Namespace) -> list[Variation]:
+def _wanted(args: argparse.Namespace) -> list[Variation]:
     known = {variation.name: variation for variation in variations()}
-    for name in args.variation:
-        if name not in known:
-            fail(f"--variation {name}: there is no such variation; there are {', '.join(known)}")
-    if args.pythons:
-        return [variation for name, variation in known.items() if name.startswith("python-")]
-    return [variation for name, variation in known.items() if not args.variation or name in args.variation]
+    wanted = chosen("variation", args.variation, known, "--variation: ")
+    return [each for each in known.values() if each.name.startswith("python-")] if args.pythons else wanted
 
 
 def _set_up_pythons() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from warnings import warn
 
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, campaign_of, tables_of
-from colibri.campaigns.engines import Engine, Pool
+from colibri.campaigns.engines import Cluster, Engine, Pool
 from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flights import FlightResult, check, common_of, fly_points
 from colibri.campaigns.journal import JOURNAL, open_journal, read_journal
@@ -65,8 +65,6 @@ def engine_of(workers: int | None, executor: Any) -> Engine:
         raise CampaignError("workers: not used with a cluster: leave it out")
     if not isinstance(executor, str) and not hasattr(executor, "submit"):
         raise CampaignError(f"executor: must be an address or a distributed.Client, not {type(executor).__name__}")
-    from colibri.campaigns.engines import Cluster
-
     return Cluster(executor)
 
 

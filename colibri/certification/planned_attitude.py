@@ -50,14 +50,6 @@ _ETA_SPARE = 1e-9
 class PlannedAttitude:
     """An unconstrained attitude law; C as in `AttitudeNumbers`."""
 
-    what = "unconstrained attitude law of lpv-mpc"
-    axes = ("about x", "about y", "about z")
-    not_proven = (
-        "what its QP commands beyond its gain at rest: of second order in the errors",
-        "that the last plan's later corrections count for nothing: for less than a thousandth",
-        "that the gain is within its bound between a grid of attitudes and thrusts",
-        "a thrust that changes",
-    )
     thrust_part = 0.5  # the rest is the rotors' for moments
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: CertifiedConditions) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.analysis.outcome import fly_to_its_end
-from colibri.analysis.recording import read_recording
+from colibri.analysis.report import Report
 from colibri.autopilot.control.interface import Clock, Controller, Decision, Horizon, VehicleState
 from colibri.autopilot.control.registry import DecisionError, check_answer, in_words
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
@@ -19,6 +19,7 @@ from colibri.common.types import Array
 from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.in_process import put_together
+from colibri.flights.spec import Window
 from colibri.plant.vehicle.description import Vehicle
 
 _STEPS = ("step", "step_on_path", "step_attitude")
@@ -161,19 +162,6 @@ _WIND, _WIND_S = "5@270", 12.0
 _TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5  # duration and least number of timed steps, without the first few
 
 
-class FlownDistance(NamedTuple):
-    """Distance to the reference at each sample, (n,), and reason of a loss."""
-
-    lost: str
-    off_m: Any
-
-    @property
-    def rms_m(self) -> float:
-        """RMS over the last third."""
-        late = self.off_m[2 * len(self.off_m) // 3 :]
-        return float(np.sqrt(np.mean(late**2))) if len(late) else np.nan
-
-
 def flight_checks(subject: Subject) -> Iterator[Row]:
     yield _hover(subject)
     for track in THESIS_TRACKS:
@@ -208,29 +196,29 @@ def time_checks(subject: Subject) -> Iterator[Row]:
 
 def _hover(subject: Subject) -> Row:
     options = {"start": subject.start(), "duration": _HOVER_S}
-    flown = fly(subject, "hover", **options)
-    furthest_m = float(flown.off_m.max()) if len(flown.off_m) else np.nan
+    lost, report = fly(subject, "hover", **options)
+    furthest_m = report["max_error_m"] if report else np.nan
     drifts = f"{furthest_m:.2f} m off its point: expected at most {_MAX_DRIFT_M:g} m"
-    failure = flown.lost or (drifts if not furthest_m <= _MAX_DRIFT_M else "")
+    failure = lost or (drifts if not furthest_m <= _MAX_DRIFT_M else "")
     found = f"at most {_length(furthest_m)} off"
     return judged(f"hover held, {_HOVER_S:g} s", failure, found, subject.command("hover", **options))
 
 
 def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
-    flown = fly(subject, track, **options)
-    found = f"RMS {_length(flown.rms_m)} after {options['duration'] * 2.0 / 3.0:.3g} s"
-    return judged(tried, flown.lost, found, subject.command(track, **options))
+    lost, report = fly(subject, track, **options)
+    rms_m = report["rmse_in_window_m"] if report and not lost else np.nan
+    found = f"RMS {_length(rms_m)} after {options['duration'] * 2.0 / 3.0:.3g} s"
+    return judged(tried, lost, found, subject.command(track, **options))
 
 
-def fly(subject: Subject, track: str, **options: Any) -> FlownDistance:
+def fly(subject: Subject, track: str, **options: Any) -> tuple[str, Report | None]:
+    """Return the reason of a loss, and the report, whose window is the last third."""
+    window = Window(options["duration"] * 2.0 / 3.0, options["duration"])
     try:
-        plan = subject.plan(track, **options)
-        outcome = fly_to_its_end(plan)
+        outcome = fly_to_its_end(subject.plan(track, window=window, **options))
     except Exception as error:
-        return FlownDistance(in_words(error), np.empty(0))
-    if outcome.report is None:
-        return FlownDistance(outcome.lost, np.empty(0))
-    return FlownDistance(outcome.lost, read_recording(plan, outcome.log).position_error_m)
+        return in_words(error), None
+    return outcome.lost, outcome.report
 
 
 def _length(metres: float) -> str:

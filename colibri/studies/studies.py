@@ -17,8 +17,7 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
 from colibri.campaigns.engines import in_order
 from colibri.campaigns.flights import common_of
-from colibri.common.errors import unknown
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.arguments import chosen
 from colibri.flights.folder import make_folder
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import study_figures
@@ -214,7 +213,7 @@ STUDIES = (
 
 
 def study(args: argparse.Namespace) -> int:
-    wanted = _wanted(args.names)
+    wanted = chosen("study", args.names, {study.name: study for study in STUDIES})
     make_folder(args.out)
     flights: list[Settings] = []
     for case in (case for study in wanted for case in study.cases):
@@ -255,11 +254,3 @@ def table(study: Study, flown: Sequence[Flown]) -> tuple[Row, list[Row]]:
         for row in dict.fromkeys(case.row for case in study.cases)
     ]
     return (*study.headings, *headings), rows
-
-
-def _wanted(names: Sequence[str]) -> list[Study]:
-    known = [study.name for study in STUDIES]
-    for name in names:
-        if name not in known:
-            fail(unknown("study", name, known))
-    return [study for study in STUDIES if not names or study.name in names]

@@ -13,8 +13,9 @@ import msgspec
 
 from colibri.analysis.tables import print_table
 from colibri.common.config import UNREADABLE
-from colibri.common.errors import Error, unknown
+from colibri.common.errors import Error
 from colibri.common.files import read_bytes
+from colibri.common.process.arguments import chosen
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.flights.fly import FlightError
 from colibri.flights.folder import make_folder
@@ -41,7 +42,7 @@ def verify_golden(args: argparse.Namespace) -> int:
     if args.duration is not None:
         fail("--duration cannot be combined with --golden: each golden flight has its own")
     path: Path = args.golden
-    flights = chosen(args.only)
+    flights = chosen("golden flight", args.only, {flight.name: flight for flight in FLIGHTS}, "--only: ")
     known = read_hashes(path) if path.exists() or not args.renew else {}
     if not args.renew:
         _check_names(path, known)
@@ -58,14 +59,6 @@ def verify_golden(args: argparse.Namespace) -> int:
     if differing:
         fail(f"not as in {path}: {', '.join(differing)}; the logs are in {args.out}", EXIT_FAILED)
     return 0
-
-
-def chosen(names: Sequence[str]) -> list[TrackCase | SitlCase]:
-    flights = {flight.name: flight for flight in FLIGHTS}
-    for name in names:
-        if name not in flights:
-            fail(f"--only: {unknown('golden flight', name, flights)}")
-    return [flight for flight in FLIGHTS if not names or flight.name in names]
 
 
 def fly_golden(flight: TrackCase | SitlCase, out: Path, link: str) -> GoldenResult:

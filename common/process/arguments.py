@@ -3,11 +3,14 @@
 import argparse
 import re
 from argparse import SUPPRESS, ArgumentTypeError
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import fail
+
+T = TypeVar("T")
 
 
 class ArgumentParser(argparse.ArgumentParser):
@@ -37,6 +40,14 @@ class ArgumentParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         fail(f"{message} (see {self.prog} --help)")
+
+
+def chosen(kind: str, names: Sequence[str], known: Mapping[str, T], option: str = "") -> list[T]:
+    """Return the things of some names, or all; end with an error for an unknown name."""
+    for name in names:
+        if name not in known:
+            fail(f"{option}{unknown(kind, name, known)}")
+    return [each for name, each in known.items() if not names or name in names]
 
 
 def number(text: str) -> float:

@@ -63,5 +63,5 @@ def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixtu
         golden_main(["--variation", "abacus"])
     assert end.value.code == 2
     error = capsys.readouterr().err
-    assert "--variation abacus: there is no such variation; there are as-it-is, openblas-nehalem" in error
+    assert '--variation: unknown variation "abacus" (choose as-it-is, openblas-nehalem' in error
     assert error.count("\n") == 1

@@ -18,8 +18,8 @@ def main() -> int:
     jobs = [Job(seed, args.datagrams, 0) for seed in args.seeds[: args.lockstep]]
     jobs += [Job(seed, 0, args.messages) for seed in args.seeds]
     print(HEADER, flush=True)
-    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda each: print(*each.lines, sep="\n", flush=True))
-    failures = [failure for result in results for failure in result.failures]
+    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda each: print(*each[0], sep="\n", flush=True))
+    failures = [failure for _, found in results for failure in found]
     print(*[f"FAILED: {failure}" for failure in failures] or [f"{len(jobs)} campaigns, and nothing failed"], sep="\n")
     return 1 if failures else 0
 

@@ -191,16 +191,12 @@ class Job(NamedTuple):
     messages: int  # from ground stations
 
 
-class JobResult(NamedTuple):
-    lines: list[str]
-    failures: list[str]
-
-
 _Fired: TypeAlias = tuple[str, int, tuple[float, float], str]
 """Target, number of datagrams or messages, memory in MiB before and after, and what was reached."""
 
 
-def fire(job: Job) -> JobResult:
+def fire(job: Job) -> tuple[list[str], list[str]]:
+    """Return lines of the table, and failures."""
     began_s = perf_counter()
     whom, run = ("lockstep", _lockstep) if job.datagrams else ("ground stations", _ground)
     with tempfile.TemporaryDirectory() as name:
@@ -211,7 +207,7 @@ def fire(job: Job) -> JobResult:
         f"{'FAILED' if failures else reached}"
         for target, sent, (before, after), reached in rows
     ]
-    return JobResult(lines, [f"seed {job.seed}, {whom}: {failure}" for failure in failures])
+    return lines, [f"seed {job.seed}, {whom}: {failure}" for failure in failures]
 
 
 def _lockstep(job: Job, folder: Path) -> tuple[list[_Fired], list[str]]:

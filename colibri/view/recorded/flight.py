@@ -47,6 +47,8 @@ class LogColumns(NamedTuple):
 class RecordedFlight:
     """A recorded flight, reduced for display; a `Source`."""
 
+    is_live = False
+
     def __init__(self, folder: Path, name: str = "", horizons: Horizons | None = None) -> None:
         try:
             self.plan = plan_of(folder)
@@ -76,10 +78,6 @@ class RecordedFlight:
             reference_path=thinned(self._reference, _PATH_POINTS),
             home_enu_m=(0.0, 0.0, _ground_m(self.plan.plant_vehicle, self._place)),
         )
-
-    @property
-    def is_live(self) -> bool:
-        return False
 
     def at(self, time_s: float) -> Snapshot:
         truth, times_s = self._truth, self._truth.times_s
@@ -115,7 +113,8 @@ class RecordedFlight:
         rotors = self.plan.plant_vehicle.rotors
         times_s = self._truth.times_s
         error = np.linalg.norm(self._place - self._reference, axis=1)
-        tilt = _tilt_deg(self._truth.columns("qw", "qx", "qy", "qz"))
+        qx, qy = self._truth.columns("qx", "qy").T
+        tilt = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (qx**2 + qy**2), -1.0, 1.0)))
         speeds = self._truth.columns(*self._omegas)
         limits = np.broadcast_to([rotors.idle_speed, rotors.max_speed], (len(times_s), 2))
         charts = [
@@ -224,12 +223,6 @@ def _between(times_s: Array, rows: Array, time_s: float) -> Array:
     part = min(max((time_s - times_s[before]) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
     between: Array = rows[before] + part * (rows[after] - rows[before])
     return between
-
-
-def _tilt_deg(quaternions: Array) -> Array:
-    _, x, y, _ = quaternions.T
-    tilt: Array = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)))
-    return tilt
 
 
 def _vector(values: Array) -> tuple[float, float, float]:
