@@ -24,7 +24,7 @@ from colibri.common.process.lifecycle import Stop, gc_frozen
 from colibri.common.process.status import Silent
 from colibri.common.spec import from_values
 from colibri.common.types import Address
-from colibri.flights.flight import SYSTEM_ID, Direct, SteppedFlight
+from colibri.flights.flight import SYSTEM_ID, direct_flight
 from colibri.flights.fly import fly_plan, fly_processes
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.feedback import Feedback
@@ -38,7 +38,6 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.plant.physics.start import nudged
 from colibri.plant.process import ardupilot_server, px4_server
-from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.parameter_files import px4_parameters
@@ -74,12 +73,10 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     stations = autopilot.stages.stations
     for link in range(channels):
         stations.streams.use(stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
-    plant = PlantBuilder(plan.spec, plan.plant_vehicle, {plan.spec.feedback: nudged(plan.start)}).build(
-        plan.spec.feedback, autopilot.frame_interval_us
-    )
+    flight = direct_flight(autopilot, plan.spec, plan.plant_vehicle, plan.spec.feedback, nudged(plan.start))
     times_us: list[float] = []
     with gc_frozen(), timed(Stage("serve", Autopilot, "serve"), times_us):
-        for _ in SteppedFlight(plant, autopilot, Direct()).samples(plan.spec.duration):
+        for _ in flight.samples(plan.spec.duration):
             pass
     sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)
     return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.spec.duration}

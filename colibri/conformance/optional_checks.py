@@ -250,14 +250,11 @@ def _difference(taken: Taken) -> tuple[int, str]:
         for at, before, after in taken:
             if before.tobytes() != after.tobytes():
                 by = float(np.abs(after - before).max())
-                return at, f"step {at} gave rotor speeds {_words(before)}, then others, by up to {by:.2g}"
+                speeds = " ".join(f"{speed:.6g}" for speed in before)
+                return at, f"step {at} gave rotor speeds {speeds}, then others, by up to {by:.2g}"
     except Exception as error:
         return at + 1, f"step {at + 1}: {in_words(error)}"
     return 0, ""
-
-
-def _words(speeds: Array) -> str:
-    return " ".join(f"{speed:.6g}" for speed in speeds)
 
 
 def _given(step: FlownStep) -> Any:

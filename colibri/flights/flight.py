@@ -16,8 +16,11 @@ from colibri.mavlink.hil.plant_status import NOTHING
 from colibri.mavlink.hil.sensors import SensorFrame, sensors_as_received
 from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame, command_as_received, state_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
+from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import World
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.simulation.plant import Plant, PlantBuilder
+from colibri.plant.spec import WorldSpec
+from colibri.plant.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
@@ -89,6 +92,14 @@ class Direct:
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         step = autopilot.step(*plant.measure())
         return Answered(step, step.command, step.faults, None)
+
+
+def direct_flight(
+    autopilot: Autopilot[StagesT], world: WorldSpec, vehicle: Vehicle, feedback: Feedback, start: Start
+) -> SteppedFlight[StagesT]:
+    """Return a flight of an autopilot without the codec, over the plant of a vehicle."""
+    plant = PlantBuilder(world, vehicle, {feedback: start}).build(feedback, autopilot.frame_interval_us)
+    return SteppedFlight(plant, autopilot, Direct())
 
 
 class InMemory:

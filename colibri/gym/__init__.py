@@ -1,6 +1,6 @@
 """Flights as learning environments: `import colibri.gym` registers Hover, Track, Recover and Race."""
 
-from colibri.gym.errors import GymError, GymImportError
+from colibri.gym.arguments import GymError, GymImportError
 
 try:
     import gymnasium

@@ -10,13 +10,20 @@ import numpy as np
 
 from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
 from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
-from colibri.common.errors import checked, shown, unknown
+from colibri.common.errors import Error, checked, shown, unknown
 from colibri.common.matrices import norm
 from colibri.common.types import Array
-from colibri.gym.errors import GymError
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.texts import wind as read_wind
+
+
+class GymError(Error):
+    """An environment cannot be made or stepped as requested."""
+
+
+class GymImportError(GymError, ImportError):
+    """A package of the extra `gym` is missing."""
 
 
 def gate_points(given: Any) -> Array:

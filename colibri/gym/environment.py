@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from colibri.autopilot.control.parts.policy_interface import MAX_POSITION_M, MAX_RATE_RAD_S, MAX_SPEED_M_S
 from colibri.common.errors import shown, unknown
+from colibri.gym.arguments import GymError
 from colibri.gym.episodes import PILOTED, Episodes, EpisodesSnapshot
-from colibri.gym.errors import GymError
 
 Values = NDArray[np.float32]
 _MAX_COUNT = 100_000

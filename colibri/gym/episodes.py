@@ -22,8 +22,7 @@ from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.gym import kernels
-from colibri.gym.arguments import gate_points, gates_of, read_draws, wind_of, within
-from colibri.gym.errors import GymError
+from colibri.gym.arguments import GymError, gate_points, gates_of, read_draws, wind_of, within
 from colibri.plant.environment.turbulence import CALM
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import RK4_STEP_S

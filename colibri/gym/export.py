@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from colibri.autopilot.control.policy import OnnxFile, OnnxLaw, PolicyInputs
 from colibri.common.errors import shown
+from colibri.gym.arguments import GymError
 from colibri.gym.episodes import PILOTED, Episodes
-from colibri.gym.errors import GymError
 
 _HEAD = "# Inputs and outputs of {}, as in docs/gym.md."
 Layers = Sequence[tuple[ArrayLike, ArrayLike]]

@@ -17,18 +17,16 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.errors import shown, unknown
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array, Vector
-from colibri.flights.flight import Direct, SteppedFlight
+from colibri.flights.flight import SteppedFlight, direct_flight
 from colibri.gym import kernels
-from colibri.gym.arguments import within
+from colibri.gym.arguments import GymError, within
 from colibri.gym.episodes import Begun, Episodes, EpisodesSnapshot
-from colibri.gym.errors import GymError
 from colibri.mavlink.hil.faults import MOTOR, OFF, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.world_changes import WindChange
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint, PositionSetpoint
 from colibri.plant.physics.start import IntegrationError, Start
-from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 
 OBSERVATIONS = ("truth", "estimate")
@@ -103,8 +101,7 @@ class PilotedEpisodes(Episodes):
         values = {"MIS_TAKEOFF_ALT": z}
         autopilot = copter_autopilot(flown, self.vehicle, settings, lambda: 0.0, values=values)
         start = Start(x=x, y=y) if self._estimates else Start(x=x, y=y, z=z, rotors=self.vehicle.hover_rpm)
-        builder = PlantBuilder(WorldSpec(), self.vehicle, {feedback: start})
-        return SteppedFlight(builder.build(feedback, autopilot.frame_interval_us), autopilot, Direct())
+        return direct_flight(autopilot, WorldSpec(), self.vehicle, feedback, start)
 
     def _in_step(self, profile: Profile) -> Profile:
         """Return the profile with the control interval nearest to its own that divides that of the actions."""

@@ -43,14 +43,11 @@ class Flown:
         return self.recording["t"]
 
     @property
-    def upright(self) -> Array:
-        """Cosine of the tilt, (n,)."""
-        return np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
-
-    @property
     def tilt_deg(self) -> Array:
         """Angle between the body's z axis and the vertical, (n,)."""
-        return np.degrees(np.arccos(np.clip(self.upright, -1.0, 1.0)))
+        upright = np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
+        angle: Array = np.degrees(np.arccos(np.clip(upright, -1.0, 1.0)))
+        return angle
 
     @property
     def settled(self) -> NDArray[np.bool_]:

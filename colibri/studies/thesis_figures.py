@@ -1,7 +1,7 @@
 """`colibri figures`: the thesis's result figures, flown anew."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -78,38 +78,29 @@ def figures(args: argparse.Namespace) -> int:
     wanted = _wanted(args.only)
     flights = [flight for flight in FLIGHTS if any(figure.flight == flight.name for figure in wanted)]
     make_folder(args.out)
-    jobs = [
-        FigureJob(flight, tuple(figure for figure in wanted if figure.flight == flight.name), args.out)
-        for flight in flights
-    ]
-    written = in_order(draw, jobs, "flights", quiet=args.quiet)
+    jobs = [(flight, [figure for figure in wanted if figure.flight == flight.name], args.out) for flight in flights]
+    written = in_order(lambda job: draw(*job), jobs, "flights", quiet=args.quiet)
     if not args.quiet:
         Console().print(f"{sum(map(len, written))} files in {args.out}")
     return 0
 
 
-class FigureJob(NamedTuple):
-    flight: ThesisFlight
-    figures: tuple[ThesisFigure, ...]
-    out: Path
-
-
-def draw(job: FigureJob) -> list[Path]:
+def draw(flight: ThesisFlight, figures: Sequence[ThesisFigure], out: Path) -> list[Path]:
     """Fly once and draw the figures of that flight."""
-    folder = job.out / "flights" / job.flight.name
+    folder = out / "flights" / flight.name
     prepare(folder)
     plan = FlightPlan.of(
-        FlightSpec.of(job.flight.track, profile="thesis", controller=job.flight.controller, link="direct", out=folder)
+        FlightSpec.of(flight.track, profile="thesis", controller=flight.controller, link="direct", out=folder)
     )
     write_provenance(plan)
     flown = FigureSeries(plan)
     keep_flight(plan, fly_locally(plan), flown.add)
     series = flown.over_time()
     paths = []
-    for figure in job.figures:
-        title = f"{figure.number}  {job.flight.title}: {KINDS[figure.kind].subject}"
+    for figure in figures:
+        title = f"{figure.number}  {flight.title}: {KINDS[figure.kind].subject}"
         name = f"{figure.number}-{figure.flight}-{figure.kind}"
-        paths += write_figure(KINDS[figure.kind].plot(series, title), job.out / name, FORMATS)
+        paths += write_figure(KINDS[figure.kind].plot(series, title), out / name, FORMATS)
     return paths
 
 

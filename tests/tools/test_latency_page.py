@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import COLUMNS, Recording
-from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, LatencyFlight, SweepPoint, fly, merit, tables
+from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, SweepPoint, fly, merit, tables
 
 GOOD, BAD = 0.001, 0.4
 
@@ -36,8 +36,8 @@ def test_the_page_says_up_to_where_it_flies() -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_only_compensation_survives_a_long_round_trip(law: str) -> None:
     case = LEMNISCATE._replace(duration_s=4.0, judged_from_s=3.0)
-    at_once, late = fly(LatencyFlight(law, case, 0.0, None)), fly(LatencyFlight(law, case, 40.0, None))
+    at_once, late = fly(law, case, 0.0, None), fly(law, case, 40.0, None)
     assert at_once is not None
     assert late is not None
     assert late < 1.5 * at_once
-    assert fly(LatencyFlight(law, case, 40.0, 0.0)) is None
+    assert fly(law, case, 40.0, 0.0) is None

@@ -306,11 +306,9 @@ def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> Gro
         for situation in SITUATIONS:
             try:
                 sent += _fire(target, situation, chance, min(quota - sent, _A_FRAME * _FRAMES_A_SITUATION))
-            except BrokenError as broken:
-                failures.append(f"{situation}, message {target.sent.total()}: {broken}")
-                break
-            except Exception:  # whatever the vehicle raises is what this looks for
-                failures.append(f"{situation}, message {target.sent.total()}:\n{format_exc()}")
+            except Exception as error:  # whatever the vehicle raises is what this looks for
+                why = f" {error}" if isinstance(error, BrokenError) else f"\n{format_exc()}"
+                failures.append(f"{situation}, message {target.sent.total()}:{why}")
                 break
         if sent >= 0.5 * quota:
             memory_mib.append(_memory_mib())

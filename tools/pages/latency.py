@@ -40,15 +40,6 @@ _ON_IT = {"x": 0.0, "y": 0.0, "z": 10.0, "vx": _SPEED_M_S, "vy": _SPEED_M_S}
 LEMNISCATE = LatencyCase("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
 
 
-class LatencyFlight(NamedTuple):
-    """A flight; `told_ms` is the delay to compensate, `None` to measure it."""
-
-    law: str
-    case: LatencyCase
-    round_trip_ms: float
-    told_ms: float | None
-
-
 class SweepPoint(NamedTuple):
     """RMS errors, m, of both flights at a round trip; `None` if lost."""
 
@@ -78,8 +69,8 @@ def merit(recording: Recording, case: LatencyCase) -> float | None:
     return rms(error[judged])
 
 
-def fly(flight: LatencyFlight) -> float | None:
-    law, case, round_trip_ms, told = flight
+def fly(law: str, case: LatencyCase, round_trip_ms: float, told: float | None) -> float | None:
+    """Fly with a delay to compensate, ms, `None` to measure it; return the merit."""
     link: dict[str, Any] = {"link": "direct", "latency": 0.5 * round_trip_ms, "delay": told}
     spec = FlightSpec.of(case.track, controller=law, **link, start=case.start, duration=case.duration_s)
     plan = FlightPlan.of(spec)
@@ -89,8 +80,8 @@ def fly(flight: LatencyFlight) -> float | None:
 
 def sweep(round_trips_ms: Sequence[float]) -> list[SweepPoint]:
     points = [(law, way, ms) for law in LAWS for way in WAYS for ms in round_trips_ms]
-    flights = [LatencyFlight(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
-    merits = in_order(fly, flights, "latency", quiet=False)
+    flights = [(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
+    merits = in_order(lambda flight: fly(*flight), flights, "latency", quiet=False)
     return [
         SweepPoint(*point, *pair)
         for point, pair in zip(points, zip(merits[::2], merits[1::2], strict=True), strict=True)

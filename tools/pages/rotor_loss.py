@@ -20,13 +20,12 @@ from colibri.campaigns.engines import in_order
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Array
-from colibri.flights.flight import Direct, SteppedFlight
+from colibri.flights.flight import SteppedFlight, direct_flight
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import Intensity, Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import state_frame
-from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_tables
@@ -102,9 +101,7 @@ def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
     values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
     autopilot = copter_autopilot(profile, vehicle, settings, lambda: 0.0, values=values)
-    starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
-    plant = PlantBuilder(world, vehicle, starts).build(case.feedback, autopilot.frame_interval_us)
-    flight = SteppedFlight(plant, autopilot, Direct())
+    flight = direct_flight(autopilot, world, vehicle, case.feedback, Start(psi=_FULL_TURN_DEG * seed / 50.0))
     _take_off(flight)
     rotor = seed % 4 + 1
     blades_gone = Fault(MOTOR, WRONG, rotor, (_BLADES_LEFT, 0.0, 0.0, 0.0))
