@@ -128,7 +128,7 @@ def test_a_station_vehicle_is_not_judged_by_its_track(plan: FlightPlan) -> None:
 
 def test_a_vehicle_that_cannot_be_flown_is_no_success(tmp_path: Path, refused: Refused) -> None:
     """A thousand times the moment of inertia that the autopilot knows."""
-    heavy = edited(VEHICLE, "[0.0034, 0.0034, 0.006]", "[3.4, 3.4, 0.006]")(tmp_path)
+    heavy = edited(tmp_path, VEHICLE, "[0.0034, 0.0034, 0.006]", "[3.4, 3.4, 0.006]")
     options = ("--plant-vehicle", heavy, "--link", "memory", "--duration", "10", "--no-figures", "--quiet")
     said = refused("fly", "spiral", *options, "--out", tmp_path, code=1)
     assert said.startswith("lost at t = ")

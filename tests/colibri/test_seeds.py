@@ -117,22 +117,10 @@ def test_what_changed_since_is_flown_again(tmp_path: Path, ran: Ran, monkeypatch
     profile, out = tmp_path / "mine.toml", tmp_path / "out"
     text = FLIGHT.read_text(encoding="utf-8")
     profile.write_text(text, encoding="utf-8")
-    command = [
-        "compare",
-        "--profile",
-        profile,
-        "--track",
-        "hover",
-        "--start",
-        "x=1",
-        "--seeds",
-        "1-2",
-        "--duration",
-        "0.5",
-    ]
+    flight = ["--track", "hover", "--start", "x=1", "--seeds", "1-2", "--duration", "0.5"]
 
     def flown(*options: str) -> tuple[str, list[str]]:
-        said = ran(*command, "--out", out, *options).out
+        said = ran("compare", "--profile", profile, *flight, "--out", out, *options).out
         with (out / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         assert {row["contender"] for row in rows} == {"mine"}

@@ -18,6 +18,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.backends.setting import Setting
+from tests.support.refusals import refusal_of
 
 WORLD: dict[str, Any] = {
     "without": ("drag", "ground"),
@@ -116,9 +117,7 @@ def test_code_is_not_json() -> None:
     ],
 )
 def test_a_wrong_value_is_named_with_what_is_valid(given: dict[str, Any], line: str) -> None:
-    with pytest.raises(SpecError) as error:
-        from_values(FlightSpec, {"track": "hover", **given})
-    assert str(error.value) == line
+    assert refusal_of(from_values, FlightSpec, {"track": "hover", **given}) == line
 
 
 def test_a_command_line_names_the_option(capsys: pytest.CaptureFixture[str]) -> None:

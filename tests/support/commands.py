@@ -22,15 +22,13 @@ Refused: TypeAlias = Callable[..., str]
 """(words of a command that is refused, code=exit code) -> the one line that it says, without `colibri: error: `."""
 
 
-def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
-    def write(folder: Path) -> str:
-        text = source.read_text(encoding="utf-8")
-        assert text.count(old) == 1
-        path = folder / source.name
-        path.write_text(text.replace(old, new), encoding="utf-8")
-        return str(path)
-
-    return write
+def edited(folder: Path, source: Path, old: str, new: str) -> str:
+    """Write a copy of a file to `folder`, with one change; return its path."""
+    text = source.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    path = folder / source.name
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return str(path)
 
 
 def exit_code(command: list[str]) -> int | str | None:

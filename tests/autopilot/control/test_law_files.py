@@ -15,6 +15,7 @@ import colibri
 from colibri.autopilot.control import law_files
 from colibri.campaigns.flights import common_of, fly_point
 from tests.support.campaigns import Hovers, planned
+from tests.support.refusals import refusal_of
 
 LAW = """
 from neighbour import PART
@@ -69,9 +70,7 @@ def test_a_file_a_module_a_class_and_an_object_fly_alike(folder: Path) -> None:
 
 @pytest.mark.parametrize(("place", "said"), BAD)
 def test_a_file_without_a_law_is_refused_in_one_line(place: str, said: str) -> None:
-    with pytest.raises(colibri.Error) as refused:
-        flown(place)
-    assert str(refused.value) == said
+    assert refusal_of(flown, place) == said
 
 
 def test_a_changed_file_is_loaded_again(folder: Path) -> None:

@@ -8,6 +8,7 @@ import colibri
 from colibri.campaigns.definition import CampaignTables, campaign_of, read_seeds, tables_of
 from colibri.campaigns.factors import CampaignError
 from tests.support.campaigns import DRAWN, MASS, planned
+from tests.support.refusals import refusal_of
 
 FILE = """
 name = "mass"
@@ -131,9 +132,7 @@ def test_what_is_no_seed_is_refused(given: Any) -> None:
     ],
 )
 def test_what_cannot_be_flown_is_refused_in_one_line(tables: dict[str, Any], said: str) -> None:
-    with pytest.raises(CampaignError) as refused:
-        planned(**tables)
-    assert str(refused.value).startswith(said)
+    assert refusal_of(planned, **tables).startswith(said)
 
 
 def test_a_file_with_an_unknown_table_is_refused(tmp_path: Path) -> None:

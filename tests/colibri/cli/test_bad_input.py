@@ -1,25 +1,16 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from colibri.common.process.folder_lock import FolderLock
 from colibri.mavlink.links.open import open_link
 from tests.support.commands import FLIGHT, PROFILE, VEHICLE, Refused, edited
-
-
-def recoded(source: Path) -> Callable[[Path], str]:
-    def write(folder: Path) -> str:
-        path = folder / source.name
-        path.write_bytes(source.read_bytes() + b"\n# gr\xf6\xdfer")
-        return str(path)
-
-    return write
-
 
 BAD_OPTIONS = [
     ("", "the following arguments are required: TRACK"),
@@ -66,72 +57,56 @@ BAD_OPTIONS = [
         "AscTec Hummingbird would start 1 m below the ground: start it higher",
     ),
 ]
-BAD_FILES = [
-    ("spiral --vehicle", recoded(VEHICLE), ": is not UTF-8: save the file as that"),
-    ("spiral --vehicle", edited(VEHICLE, "mass_kg = 0.698", ""), "body: Object missing required field `mass_kg`"),
-    ("spiral --vehicle", edited(VEHICLE, "mass_kg = 0.698", "mass_kg = -1.0"), "body.mass_kg: Expected `float` > 0.0"),
+BAD_VEHICLES = (
+    ("mass_kg = 0.698", "", "body: Object missing required field `mass_kg`"),
+    ("mass_kg = 0.698", "mass_kg = -1.0", "body.mass_kg: Expected `float` > 0.0"),
+    ("[body]", "[body]\ncolour = 1", "body: Object contains unknown field `colour`"),
+    ('"rad/s"', '"rad/sec"', "rotors.speed_unit: Invalid enum value 'rad/sec': choose rad/s, rpm"),
+    ("damping_n_s_m = 100.0", "damping_n_s_m = 1e4", "ground.damping_n_s_m 10000 is too large, at most "),
+)
+BAD_PROFILES = (
+    ("frame_interval_s = 0.004", "frame_interval_s = 0.003", "0.003 does not divide the control interval of 0.008 s: "),
     (
-        "spiral --plant-vehicle",
-        edited(VEHICLE, "[body]", "[body]\ncolour = 1"),
-        "body: Object contains unknown field `colour`",
-    ),
-    (
-        "spiral --vehicle",
-        edited(VEHICLE, 'speed_unit = "rad/s"', 'speed_unit = "rad/sec"'),
-        "rotors.speed_unit: Invalid enum value 'rad/sec': choose rad/s, rpm",
-    ),
-    (
-        "spiral --vehicle",
-        edited(VEHICLE, "damping_n_s_m = 100.0", "damping_n_s_m = 1e4"),
-        "ground.damping_n_s_m 10000 is too large, at most ",
-    ),
-    (
-        "spiral --profile",
-        edited(PROFILE, "rotor_speed_rpm = 3000.0", "rotor_speed_rpm = -1.0"),
-        "simulation.rotor_speed_rpm: Expected `float` >= 0.0",
-    ),
-    (
-        "spiral --profile",
-        edited(FLIGHT, "frame_interval_s = 0.004", "frame_interval_s = 0.003"),
-        "simulation.frame_interval_s: 0.003 does not divide the control interval of 0.008 s: choose ",
-    ),
-    (
-        "spiral --profile",
-        edited(PROFILE, "horizon = 4   ", "horizon = 0   "),
-        "controllers.cascade: attitude.horizon: Expected `int` >= 1",
-    ),
-    (
-        "spiral --profile",
-        edited(FLIGHT, "blocks = [1, 2, 3, 5, 7, 10]", "blocks = []"),
+        "blocks = [1, 2, 3, 5, 7, 10]",
+        "blocks = []",
         "controllers.lpv-mpc: plan.blocks: Expected `array` of length >= 1",
     ),
-    (
-        "spiral --profile",
-        edited(FLIGHT, '"by-formula"', '"by-hand"'),
-        "references: Invalid enum value 'by-hand': choose by-differences, by-formula",
-    ),
+    ('"by-formula"', '"by-hand"', "Invalid enum value 'by-hand': choose by-differences, by-formula"),
+)
+BAD_FILES = [
+    *(("--vehicle", VEHICLE, *row) for row in BAD_VEHICLES),
+    *(("--profile", FLIGHT, *row) for row in BAD_PROFILES),
+    ("--plant-vehicle", VEHICLE, "[body]", "[body]\ncolour = 1", "body: Object contains unknown field `colour`"),
+    ("--profile", PROFILE, "rpm = 3000.0", "rpm = -1.0", "simulation.rotor_speed_rpm: Expected `float` >= 0.0"),
+    ("--profile", PROFILE, "on = 4   ", "on = 0   ", "controllers.cascade: attitude.horizon: Expected `int` >= 1"),
 ]
 SEEN_BY_THE_AUTOPILOT = ("unknown solver", "gurobi is", "controllers.")
 """Over UDP its process has to be started for these lines; `--controller pid` shows the same in seconds."""
 
 
-def is_slow(line: str) -> bool:
-    return any(each in line for each in SEEN_BY_THE_AUTOPILOT)
+def on_both_links(rows: Sequence[tuple[Any, ...]]) -> list[Any]:
+    slow = [row for row in rows if any(each in row[-1] for each in SEEN_BY_THE_AUTOPILOT)]
+    over_udp = [pytest.param("udp", *row, marks=pytest.mark.long if row in slow else ()) for row in rows]
+    return [*over_udp, *(("direct", *row) for row in rows)]
 
 
-@pytest.mark.parametrize(
-    ("words", "write", "line", "link"),
-    [
-        pytest.param(words, write, line, link, marks=pytest.mark.long if link == "udp" and is_slow(line) else ())
-        for words, write, line in (*((words, None, line) for words, line in BAD_OPTIONS), *BAD_FILES)
-        for link in ("udp", "direct")
-    ],
-)
-def test_bad_input_gets_one_line_and_exit_code_2(
-    tmp_path: Path, refused: Refused, words: str, write: Callable[[Path], str] | None, line: str, link: str
+@pytest.mark.parametrize(("link", "words", "line"), on_both_links(BAD_OPTIONS))
+def test_bad_options_get_one_line(tmp_path: Path, refused: Refused, link: str, words: str, line: str) -> None:
+    assert line in refused("fly", f"--link={link}", "--out", tmp_path / "out", *words.split())
+
+
+@pytest.mark.parametrize(("link", "option", "source", "old", "new", "line"), on_both_links(BAD_FILES))
+def test_bad_files_get_one_line(
+    tmp_path: Path, refused: Refused, link: str, option: str, source: Path, old: str, new: str, line: str
 ) -> None:
-    given = [*words.split(), *([write(tmp_path)] if write else [])]
-    assert line in refused("fly", f"--link={link}", "--out", tmp_path / "out", *given)
+    words = ("fly", "spiral", option, edited(tmp_path, source, old, new))
+    assert line in refused(*words, f"--link={link}", "--out", tmp_path / "out")
+
+
+def test_a_file_in_another_encoding_is_refused(tmp_path: Path, refused: Refused) -> None:
+    path = tmp_path / VEHICLE.name
+    path.write_bytes(VEHICLE.read_bytes() + b"\n# gr\xf6\xdfer")
+    assert ": is not UTF-8: save the file as that" in refused("fly", "spiral", "--vehicle", path)
 
 
 def test_out_that_cannot_be_written(tmp_path: Path, refused: Refused) -> None:

@@ -138,7 +138,7 @@ def test_a_vehicle_is_written_as_parameters_of_another_autopilot(whom: str, tmp_
     printed = ran("vehicle", "hummingbird", "--for", whom).out
     assert printed.startswith(f"# AscTec Hummingbird, by colibri vehicle hummingbird --for {whom}\n")
     out = tmp_path / "new" / "vehicle.params"
-    heavier = edited(VEHICLE, "mass_kg = 0.698", "mass_kg = 0.8")(tmp_path)
+    heavier = edited(tmp_path, VEHICLE, "mass_kg = 0.698", "mass_kg = 0.8")
     assert ran("vehicle", heavier, "--for", whom, "--out", out).out == ""
     written = out.read_text(encoding="utf-8")
     assert written.splitlines()[0].endswith(f" --for {whom}")
@@ -149,7 +149,7 @@ def test_a_vehicle_is_written_as_parameters_of_another_autopilot(whom: str, tmp_
 
 def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, ran: Ran, refused: Refused) -> None:
     """By what is in its folder alone: neither its profile nor its waypoints are there any more."""
-    profile, points = edited(FLIGHT, 'name = "flight"', 'name = "mine"')(tmp_path), tmp_path / "points.csv"
+    profile, points = edited(tmp_path, FLIGHT, 'name = "flight"', 'name = "mine"'), tmp_path / "points.csv"
     points.write_text("x,y,z\n0,0,1\n2,0,2\n", encoding="utf-8")
     out = tmp_path / "out"
     options = ("--profile", profile, "--link", "memory", "--duration", "0.5", "--wind", "2@270", "--no-figures")
@@ -232,15 +232,5 @@ def test_a_plant_with_another_rotor_order_is_refused(tmp_path: Path, ran: Ran, r
     for order in ("px4", "clockwise"):
         ran("vehicle", "new", order, *options, "--order", order, "--out", tmp_path / f"{order}.toml")
     plant = ("--plant-vehicle", tmp_path / "px4.toml")
-    fly = (
-        "fly",
-        "hover",
-        "--vehicle",
-        tmp_path / "clockwise.toml",
-        *plant,
-        "--link",
-        "memory",
-        "--out",
-        tmp_path / "out",
-    )
-    assert "in another order" in refused(*fly)
+    fly = ("fly", "hover", "--vehicle", tmp_path / "clockwise.toml", *plant, "--link", "memory")
+    assert "in another order" in refused(*fly, "--out", tmp_path / "out")

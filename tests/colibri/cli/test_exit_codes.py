@@ -66,17 +66,9 @@ def test_an_unread_pipe_does_not_hold_up_a_flight(tmp_path: Path) -> None:
     free, called = bound_socket()
     free.close()
     read, write = full_pipe()
-    options = (
-        "--link",
-        called.replace("udpout", "udpin"),
-        "--duration",
-        "2",
-        "--json",
-        "--out",
-        str(tmp_path),
-        *THESIS_PLANT,
-    )
-    plant = subprocess.Popen([*COLIBRI, "plant", *options], stdout=write, stderr=write)
+    link, out = called.replace("udpout", "udpin"), ("--json", "--out", str(tmp_path))
+    command = [*COLIBRI, "plant", "--link", link, "--duration", "2", *out, *THESIS_PLANT]
+    plant = subprocess.Popen(command, stdout=write, stderr=write)
     autopilot = subprocess.Popen([*COLIBRI, "autopilot", "--plant", called, "--profile", "thesis"], stderr=write)
     assert plant.wait(60.0) == 0
     autopilot.terminate()

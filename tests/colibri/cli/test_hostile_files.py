@@ -124,7 +124,7 @@ def test_a_log_that_ends_in_a_long_message_is_not_read_forever(flown: Path, caps
 def test_hostile_numbers(
     option: str, source: Path, old: str, new: str, line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = edited(source, old, new)(tmp_path)
+    path = edited(tmp_path, source, old, new)
     words = f"fly lemniscate {FLOWN} {option} {path}".format(folder=tmp_path).split()
     assert line in said(words, capsys)
 

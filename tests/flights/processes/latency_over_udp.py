@@ -50,17 +50,8 @@ def fly(case: LatencyCase, round_trip_ms: float, speed: float) -> tuple[float | 
         logs.mkdir()
         options = {"link": "udp", "start": case.start, "duration": case.duration_s, "out": out}
         plan = FlightPlan.of(FlightSpec.of(case.track, **options))
-        words = (
-            "--start",
-            str(plan.start),
-            "--duration",
-            repr(case.duration_s),
-            "--speed",
-            repr(speed),
-            "--out",
-            str(out),
-        )
-        plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *words)
+        words = ("--start", str(plan.start), "--duration", repr(case.duration_s), "--speed", repr(speed))
+        plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *words, "--out", str(out))
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
         with DelayRelay(url, 0.5e-3 * round_trip_ms / speed) as relay:
             to_fly = ("--plant", relay.url, "--track", case.track, "--delay", "0", "--out", str(out))

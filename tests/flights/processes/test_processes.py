@@ -30,17 +30,9 @@ def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> No
         first.process.send_signal(signal.SIGKILL)
         first.wait()
         assert "waiting for a plant" in autopilot.wait_for("silence")["text"]
-        second = Process(
-            logs,
-            "plant",
-            "--link",
-            url.replace("udpout", "udpin"),
-            "--duration",
-            "10",
-            "--out",
-            str(tmp_path / "second"),
-            *THESIS_PLANT,
-        )
+        link = ("--link", url.replace("udpout", "udpin"))
+        out = ("--out", str(tmp_path / "second"))
+        second = Process(logs, "plant", *link, *THESIS_PLANT, "--duration", "10", *out)
         with running(second):
             assert second.wait_for("ended")["frames"] == 100
     fly_thesis(tmp_path / "alone", "spiral", "--link", "memory", "--duration", "10")

@@ -17,6 +17,7 @@ from colibri.plant.spec import WorldSpec
 from colibri.plant.texts import gust
 from colibri.plant.texts import wind as read_wind
 from tests.support.plant_flights import FRAME_US, hover, hummingbird, rpm
+from tests.support.refusals import refusal_of
 
 VEHICLE = hummingbird("drag", "rotor-lag")
 START = Start(z=9.0, rotors=rpm(VEHICLE, VEHICLE.hover_speed))
@@ -81,9 +82,7 @@ def test_a_wind_from_a_file_is_linear_between_its_times(tmp_path: Path) -> None:
 )
 def test_a_file_that_is_no_wind(tmp_path: Path, text: str, line: str) -> None:
     path = written(tmp_path, text)
-    with pytest.raises(ArgumentTypeError) as error:
-        read_wind(str(path))
-    assert str(error.value).startswith(f"{path}: {line}")
+    assert refusal_of(read_wind, str(path)).startswith(f"{path}: {line}")
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
@@ -109,9 +108,7 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_gust(text: str, line: str) -> None:
-    with pytest.raises(ArgumentTypeError) as error:
-        gust(text)
-    assert str(error.value).startswith(line)
+    assert refusal_of(gust, text).startswith(line)
 
 
 @given(WINDS, st.lists(GUSTS, max_size=3), st.sampled_from([None, *INTENSITIES]), st.integers(0, 2**32))

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import ROUNDING_M, fit
 from colibri.autopilot.guidance.trajectories.reach import Demand, Reach, exact_motion, times
 from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
@@ -13,6 +12,7 @@ from colibri.autopilot.guidance.trajectories.waypoint_file import MARGIN, Waypoi
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.paths import DIPS
+from tests.support.refusals import refusal_of
 
 UP_AND_DOWN = "x,y,z,t\n0,0,51,0\n0,0,70,2\n0,0,51,4\n0,0,70,6\n0,0,70,10\n"
 
@@ -111,9 +111,7 @@ def test_a_track_that_is_too_fast_is_slowed_down(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_may_not_be_changed_is_refused_by_its_leg(tmp_path: Path, text: str, why: str) -> None:
-    with pytest.raises(TrackFileError) as refused:
-        fit(waypoints(tmp_path, text), reach(), 0.0)
-    assert str(refused.value) == f"{tmp_path / 'points.csv'}: {why}"
+    assert refusal_of(fit, waypoints(tmp_path, text), reach(), 0.0) == f"{tmp_path / 'points.csv'}: {why}"
 
 
 def test_a_start_in_motion_at_20_hz_is_accepted(tmp_path: Path) -> None:

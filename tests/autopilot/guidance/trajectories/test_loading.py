@@ -6,11 +6,12 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
-from colibri.autopilot.guidance.trajectories.registry import TrackError, track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.foreign import TRACK, FlyTheirs, example, fly_as_a_user
+from tests.support.refusals import refusal_of
 
 
 def loaded(name: str, floor_m: float | None = None, vehicle: str = "hummingbird") -> LoadedTrack:
@@ -57,9 +58,7 @@ def test_a_formula_beyond_the_limits_is_flown_as_it_is_and_said() -> None:
     ],
 )
 def test_a_track_below_the_floor_is_refused(name: str, floor_m: float | None, why: str) -> None:
-    with pytest.raises(TrackError) as refused:
-        loaded(name, floor_m)
-    assert str(refused.value) == why
+    assert refusal_of(loaded, name, floor_m) == why
 
 
 @pytest.mark.parametrize(
@@ -106,9 +105,7 @@ def test_samples_that_contradict_are_refused(tmp_path: Path, line: int, column: 
     cells = lines[line].split(",")
     cells[column] = value
     lines[line] = ",".join(cells)
-    with pytest.raises(TrackError) as refused:
-        track(write(tmp_path, lines))
-    assert str(refused.value) == f"{tmp_path / 'track.csv'}: {why}"
+    assert refusal_of(track, write(tmp_path, lines)) == f"{tmp_path / 'track.csv'}: {why}"
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.guidance.trajectories.registry import TrackError, track
 from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, position
 from colibri.flights.spec import TRACK_HELP
+from tests.support.refusals import refusal_of
 
 
 def test_the_five_of_the_thesis() -> None:
@@ -43,9 +44,7 @@ def test_the_five_of_the_thesis() -> None:
     ],
 )  # fmt: skip
 def test_what_is_no_track_is_one_line(name: str, line: str) -> None:
-    with pytest.raises(TrackError) as refused:
-        track(name)
-    assert str(refused.value) == line
+    assert refusal_of(track, name) == line
 
 
 @given(st.sampled_from([*THESIS_TRACKS, *OPTIONS]), st.text(st.characters(exclude_categories=["Cs"]), max_size=30))

@@ -8,6 +8,7 @@ from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.registry import TrackError, track
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
+from tests.support.refusals import refusal_of
 
 
 def write(folder: Path, text: str) -> Path:
@@ -60,9 +61,7 @@ def test_times_from_a_speed_halve_it_on_the_end_legs(tmp_path: Path, speed: floa
     ],
 )
 def test_what_cannot_be_flown_is_one_line(tmp_path: Path, text: str, line: str) -> None:
-    with pytest.raises(TrackFileError) as refused:
-        read(tmp_path, text)
-    assert str(refused.value) == f"{tmp_path / 'points.csv'}: {line}"
+    assert refusal_of(read, tmp_path, text) == f"{tmp_path / 'points.csv'}: {line}"
     with pytest.raises(TrackError, match=r"points\.csv: line"):
         track(f"waypoints:{tmp_path / 'points.csv'}")
 
