@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from math import degrees, hypot
-from typing import Any
 
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
@@ -14,14 +13,6 @@ LOCAL = mav.MAV_FRAME_LOCAL_NED
 STABILIZE, ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, LAND, BRAKE = 0, 2, 3, 4, 5, 6, 7, 9, 17
 STANDARD = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 Check = Callable[[Sitl], object]
-
-
-def latest(sitl: Sitl, name: str) -> Any:
-    """Request a message and return it."""
-    before = len(sitl.gcs.heard[name])
-    sitl.command(mav.MAV_CMD_REQUEST_MESSAGE, getattr(mav, f"MAVLINK_MSG_ID_{name}"))
-    sitl.wait_until(lambda: len(sitl.gcs.heard[name]) > before, within=5.0, what=name)
-    return sitl.gcs.latest(name)
 
 
 def shown(sitl: Sitl) -> int:
@@ -40,14 +31,6 @@ def both(sitl: Sitl, number: int, *params: float, z: float = 0.0) -> tuple[int, 
     """Send a command as COMMAND_LONG and as COMMAND_INT."""
     p = (*params, *(0.0,) * (4 - len(params)))
     return (sitl.gcs.order(number, *p, 0.0, 0.0, z), sitl.gcs.order_int(number, *p, frame=RELATIVE, x=0, y=0, z=z))
-
-
-def held(sitl: Sitl, fact: Callable[[], bool], seconds: float, what: str = "") -> None:
-    """Fly on while a fact holds."""
-    end = sitl.time_us + round(seconds * 1e6)
-    while sitl.time_us < end:
-        sitl.step()
-        assert fact(), f"{what} at {sitl.time_us * 1e-6:.1f} s: {sitl.position} {sitl.velocity}"
 
 
 def reaches(sitl: Sitl, fact: Callable[[], bool], seconds: float, within: float, what: str) -> None:

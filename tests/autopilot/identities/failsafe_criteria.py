@@ -18,11 +18,9 @@ from tests.autopilot.identities.copter_words import (
     ground_speed,
     heading,
     height,
-    held,
     home_and_disarmed,
     in_auto,
     in_mode,
-    latest,
     near_angle,
     says,
     shown,
@@ -30,6 +28,7 @@ from tests.autopilot.identities.copter_words import (
     upload,
 )
 from tests.autopilot.identities.flight_criteria import velocity
+from tests.support.flying import latest
 
 
 def return_facing(sitl: Sitl) -> None:
@@ -47,9 +46,9 @@ def return_at_height(sitl: Sitl) -> None:
     sitl.goto(0.0, 100.0, 15.0)
     sitl.select("RTL")
     sitl.wait_until(lambda: abs(ground_speed(sitl) - 7.0) < 0.5, within=30.0)
-    held(sitl, lambda: abs(ground_speed(sitl) - 7.0) < 0.5, 3.0, "speed")
+    sitl.hold(lambda: abs(ground_speed(sitl) - 7.0) < 0.5, for_=3.0, what="speed")
     sitl.wait_until(lambda: dist(sitl.position, (0.0, 0.0, 10.0)) < 1.0, within=80.0)
-    held(sitl, lambda: dist(sitl.position, (0.0, 0.0, 10.0)) < 2.0 and sitl.armed, 20.0, "hover")
+    sitl.hold(lambda: dist(sitl.position, (0.0, 0.0, 10.0)) < 2.0 and sitl.armed, for_=20.0, what="hover")
 
 
 def return_to_rally(sitl: Sitl) -> None:
@@ -181,7 +180,7 @@ def station_failsafe(sitl: Sitl) -> None:
         home_and_disarmed(sitl)
 
 
-def battery_failsafe(sitl: Sitl) -> None:
+def battery(sitl: Sitl) -> None:
     def charge_state() -> int:
         return int(latest(sitl, "BATTERY_STATUS").charge_state)
 
@@ -223,7 +222,7 @@ def without_receiver(sitl: Sitl) -> None:
     sitl.run(10.0)
     assert sitl.command(mav.MAV_CMD_DO_SET_MODE, 1.0, STABILIZE) == FAILED
     sitl.select("GUIDED")
-    held(sitl, lambda: ground_speed(sitl) <= 0.1, 10.0, "standing")
+    sitl.hold(lambda: ground_speed(sitl) <= 0.1, for_=10.0, what="standing")
     steered(sitl, 1.0, c1=1500, c2=1500, c3=1500, c4=1500)
     sitl.select("LOITER")
     steered(sitl, 8.0, c3=1800)
@@ -236,7 +235,9 @@ def weak_motor(sitl: Sitl) -> None:
     sitl.set_param("SIM_ENGINE_FAIL", 1)
     sitl.run(3.0)
     place = (0.0, 0.0, 20.0)
-    held(sitl, lambda: dist(sitl.position[:2], place[:2]) < 10.0 and abs(height(sitl) - 20.0) < 5.0, 30.0, "place")
+    sitl.hold(
+        lambda: dist(sitl.position[:2], place[:2]) < 10.0 and abs(height(sitl) - 20.0) < 5.0, for_=30.0, what="place"
+    )
 
 
 def radio_failsafe_without_gps(sitl: Sitl) -> None:
@@ -260,8 +261,8 @@ def gps_glitches(sitl: Sitl) -> None:
     for x, y in ((3, 1), (6, 2), (0, 5), (-3, 0), (-8, -3), (0, 10), (0, 0)):
         sitl.set_param("SIM_GPS1_GLTCH_X", 1e-4 * x)
         sitl.set_param("SIM_GPS1_GLTCH_Y", 1e-4 * y)
-        held(sitl, lambda: hypot(*sitl.position[:2]) < 20.0, 2.0, "true place")
-    held(sitl, lambda: hypot(*sitl.position[:2]) < 20.0, 15.0, "true place")
+        sitl.hold(lambda: hypot(*sitl.position[:2]) < 20.0, for_=2.0, what="true place")
+    sitl.hold(lambda: hypot(*sitl.position[:2]) < 20.0, for_=15.0, what="true place")
 
 
 def disarming(sitl: Sitl) -> None:

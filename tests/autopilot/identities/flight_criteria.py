@@ -14,10 +14,8 @@ from tests.autopilot.identities.copter_words import (
     ground_speed,
     heading,
     height,
-    held,
     home_and_disarmed,
     in_auto,
-    latest,
     near_angle,
     radio,
     rtl,
@@ -27,11 +25,12 @@ from tests.autopilot.identities.copter_words import (
     steered,
     upload,
 )
+from tests.support.flying import latest
 
 
 def takeoff_heights(sitl: Sitl) -> None:
     sitl.takeoff(5.0)
-    held(sitl, lambda: 4.5 <= height(sitl) <= 5.5, 5.0, "height")
+    sitl.hold(lambda: 4.5 <= height(sitl) <= 5.5, for_=5.0, what="height")
     rtl(sitl)
     higher = latest(sitl, "HOME_POSITION")
     sitl.select("GUIDED")
@@ -40,7 +39,7 @@ def takeoff_heights(sitl: Sitl) -> None:
     sitl.gcs.order_int(mav.MAV_CMD_DO_SET_HOME, frame=GLOBAL, x=higher.latitude, y=higher.longitude, z=z)
     assert sitl.gcs.order_int(mav.MAV_CMD_NAV_TAKEOFF, frame=RELATIVE, x=0, y=0, z=5.0) == ACCEPTED
     sitl.wait_until(lambda: abs(height(sitl) - 25.0) < 0.4, within=40.0)
-    held(sitl, lambda: abs(height(sitl) - 25.0) <= 0.5, 5.0, "height above home")
+    sitl.hold(lambda: abs(height(sitl) - 25.0) <= 0.5, for_=5.0, what="height above home")
 
 
 def condition_yaw(sitl: Sitl) -> None:
@@ -56,7 +55,7 @@ def condition_yaw(sitl: Sitl) -> None:
             sitl.step()
             assert not rate or abs(degrees(sitl.rates[2])) < limit, "it turns as slowly as it was told"
             assert sitl.time_us < 120e6
-        held(sitl, lambda target=target: near_angle(heading(sitl), target, 5.0), 2.0, "heading")  # type: ignore[misc]
+        sitl.hold(lambda target=target: near_angle(heading(sitl), target, 5.0), for_=2.0, what="heading")  # type: ignore[misc]
 
 
 def alt_hold(sitl: Sitl) -> None:
@@ -66,7 +65,7 @@ def alt_hold(sitl: Sitl) -> None:
     for tilt in (1500, 1000):
         for _ in range(10):
             radio(sitl, c1=tilt, c2=tilt, c3=1500)
-            held(sitl, lambda: 9.0 <= height(sitl) <= 11.0, 0.5, "height")
+            sitl.hold(lambda: 9.0 <= height(sitl) <= 11.0, for_=0.5, what="height")
 
 
 def loiter(sitl: Sitl) -> None:
@@ -79,7 +78,7 @@ def loiter(sitl: Sitl) -> None:
     place = sitl.position
     for _ in range(20):
         radio(sitl, c3=1500)
-        held(sitl, lambda: dist(sitl.position, place) < 5.0, 0.5, "place")
+        sitl.hold(lambda: dist(sitl.position, place) < 5.0, for_=0.5, what="place")
     steered(sitl, 6.0, c3=1800)
     assert height(sitl) > 25.0
     steered(sitl, 4.0, c3=1200)
@@ -117,7 +116,7 @@ def takeoff_by_stick(sitl: Sitl) -> None:
     steered(sitl, 8.0, c3=1500)
     for _ in range(20):
         radio(sitl, c3=1500)
-        held(sitl, lambda: 6.9 <= height(sitl) <= 8.0, 0.5, "height")
+        sitl.hold(lambda: 6.9 <= height(sitl) <= 8.0, for_=0.5, what="height")
 
 
 def without_gps(sitl: Sitl) -> None:
@@ -142,10 +141,10 @@ def landing(sitl: Sitl) -> None:
     sitl.takeoff(25.0)
     sitl.select("LAND")
     sitl.wait_until(lambda: sitl.velocity[2] < -1.45, within=10.0)
-    held(sitl, lambda: abs(sitl.velocity[2] + 1.5) <= 0.1, 5.0, "fast")
+    sitl.hold(lambda: abs(sitl.velocity[2] + 1.5) <= 0.1, for_=5.0, what="fast")
     sitl.wait_until(lambda: sitl.velocity[2] > -0.6, within=30.0)
     assert abs(height(sitl) - 10.0) < 1.5
-    held(sitl, lambda: abs(sitl.velocity[2] + 0.5) <= 0.1, 5.0, "slow")
+    sitl.hold(lambda: abs(sitl.velocity[2] + 0.5) <= 0.1, for_=5.0, what="slow")
     home_and_disarmed(sitl)
 
 
@@ -198,7 +197,7 @@ def takeoff_below(sitl: Sitl) -> None:
     )
     sitl.takeoff(10.0)
     sitl.select("AUTO")
-    held(sitl, lambda: abs(height(sitl) - 10.0) < 1.0, 4.0, "height")
+    sitl.hold(lambda: abs(height(sitl) - 10.0) < 1.0, for_=4.0, what="height")
 
 
 def pause_mission(sitl: Sitl) -> None:
@@ -208,7 +207,7 @@ def pause_mission(sitl: Sitl) -> None:
     for _ in range(2):
         assert sitl.command(mav.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == ACCEPTED
     sitl.wait_until(lambda: ground_speed(sitl) < 1.0, within=10.0)
-    held(sitl, lambda: ground_speed(sitl) <= 1.0, 5.0, "pause")
+    sitl.hold(lambda: ground_speed(sitl) <= 1.0, for_=5.0, what="pause")
     assert shown(sitl) == AUTO
     for _ in range(2):
         assert sitl.command(mav.MAV_CMD_DO_PAUSE_CONTINUE, 1.0) == ACCEPTED
@@ -226,7 +225,7 @@ def pause_guided(sitl: Sitl) -> None:
         sitl.wait_until(lambda: ground_speed(sitl) > 5.0, within=20.0)
         assert sitl.command(mav.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == ACCEPTED
         sitl.wait_until(lambda: ground_speed(sitl) < 1.0, within=10.0)
-        held(sitl, lambda: ground_speed(sitl) <= 1.0, 5.0, "pause")
+        sitl.hold(lambda: ground_speed(sitl) <= 1.0, for_=5.0, what="pause")
         assert sitl.command(mav.MAV_CMD_DO_PAUSE_CONTINUE, 1.0) == ACCEPTED
         sitl.wait_until(lambda: ground_speed(sitl) > 5.0, within=20.0)
 
@@ -266,9 +265,9 @@ def vertical_speed_parameters(sitl: Sitl) -> None:
     for speed in (7.0, 6.0):
         sitl.set_param("WPNAV_SPEED_UP", 100.0 * speed)
         sitl.wait_until(lambda speed=speed: abs(sitl.velocity[2] - speed) < 1.0, within=40.0)  # type: ignore[misc]
-        held(sitl, lambda speed=speed: abs(sitl.velocity[2] - speed) < 1.0, 3.0, f"{speed} m/s")  # type: ignore[misc]
+        sitl.hold(lambda speed=speed: abs(sitl.velocity[2] - speed) < 1.0, for_=3.0, what=f"{speed} m/s")  # type: ignore[misc]
     sitl.wait_until(lambda: sitl.velocity[2] < -4.0, within=60.0)
-    held(sitl, lambda: abs(sitl.velocity[2] + 5.0) < 1.0, 4.0, "descent")
+    sitl.hold(lambda: abs(sitl.velocity[2] + 5.0) < 1.0, for_=4.0, what="descent")
 
 
 def guided_submodes(sitl: Sitl) -> None:
@@ -307,7 +306,7 @@ def global_positions(sitl: Sitl) -> None:
         mask, where = 0b100111111000, (home.latitude, home.longitude, 20.0)
         sitl.send("SET_POSITION_TARGET_GLOBAL_INT", 0, 1, 1, 6, mask, *where, *(0.0,) * 6, yaw * 0.0174533, 0.0)
         sitl.wait_until(lambda yaw=yaw: near_angle(heading(sitl), yaw), within=10.0)  # type: ignore[misc]
-        held(sitl, lambda yaw=yaw: near_angle(heading(sitl), yaw), 5.0, "heading")  # type: ignore[misc]
+        sitl.hold(lambda yaw=yaw: near_angle(heading(sitl), yaw), for_=5.0, what="heading")  # type: ignore[misc]
 
 
 def velocities(sitl: Sitl) -> None:
@@ -317,7 +316,7 @@ def velocities(sitl: Sitl) -> None:
         wanted = (east, north, -down)
         sitl.wait_until(lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.3, within=3.0)  # type: ignore[misc]
         velocity(sitl, north, east, down)
-        held(sitl, lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.5, 2.0, "velocity")  # type: ignore[misc]
+        sitl.hold(lambda wanted=wanted: dist(sitl.velocity, wanted) < 0.5, for_=2.0, what="velocity")  # type: ignore[misc]
     for frame in (0, 3, 5, 6, 10, 11):
         for north in (1.0, -1.0):
             target = (0, 1, 1, frame, 3527, 0, 0, 0.0, north, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -331,7 +330,7 @@ def velocities(sitl: Sitl) -> None:
     sitl.run(1.0)
     velocity(sitl, 1.0, -3.6e30, 0.0)
     sitl.wait_until(lambda: hypot(*sitl.velocity) < 0.3, within=5.0)
-    held(sitl, lambda: hypot(*sitl.velocity) < 0.3, 10.0, "standing")
+    sitl.hold(lambda: hypot(*sitl.velocity) < 0.3, for_=10.0, what="standing")
 
 
 def guided_thrust(sitl: Sitl) -> None:

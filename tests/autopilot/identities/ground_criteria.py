@@ -26,11 +26,11 @@ from tests.autopilot.identities.copter_words import (
     STABILIZE,
     both,
     in_mode,
-    latest,
     says,
     steered,
     upload,
 )
+from tests.support.flying import latest
 
 
 def commands_change_modes(sitl: Sitl) -> None:

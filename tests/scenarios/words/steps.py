@@ -21,6 +21,10 @@ def _order(method: str) -> Callable[..., Step]:
     return lambda *given, **options: methodcaller(method, *given, **options)
 
 
+def _nothing(_: Sitl) -> None:
+    """Only fly on."""
+
+
 run, arm, disarm, takeoff, land, select = map(_order, ("run", "arm", "disarm", "takeoff", "land", "select"))
 put, upload, upload_fence, inject = map(_order, ("set_param", "upload_mission", "upload_fence", "inject"))
 start_mission, kill_autopilot = methodcaller("start_mission"), methodcaller("kill_autopilot")
@@ -48,28 +52,20 @@ def refused(step: Step, because: str) -> Step:
     return attempt
 
 
-def until(condition: Condition, *, within: float, meanwhile: Step | None = None) -> Step:
-    def step(sitl: Sitl) -> None:
-        def there() -> bool:
-            if meanwhile is not None:
-                meanwhile(sitl)
-            return condition.holds(sitl)
-
-        sitl.wait_until(there, within=within, what=condition.words)
-
-    return step
+def until(condition: Condition, *, within: float, meanwhile: Step = _nothing) -> Step:
+    return lambda sitl: sitl.wait_until(_beside(meanwhile, condition, sitl), within=within, what=condition.words)
 
 
-def hold(condition: Condition, *, for_: float, meanwhile: Step | None = None) -> Step:
-    def step(sitl: Sitl) -> None:
-        def still() -> bool:
-            if meanwhile is not None:
-                meanwhile(sitl)
-            return condition.holds(sitl)
+def hold(condition: Condition, *, for_: float, meanwhile: Step = _nothing) -> Step:
+    return lambda sitl: sitl.hold(_beside(meanwhile, condition, sitl), for_=for_, what=condition.words)
 
-        sitl.hold(still, for_=for_, what=condition.words)
 
-    return step
+def _beside(step: Step, condition: Condition, sitl: Sitl) -> Callable[[], bool]:
+    def holds() -> bool:
+        step(sitl)
+        return condition.holds(sitl)
+
+    return holds
 
 
 def moves_less(max_m: float, seconds: float, tilt: float = 90.0) -> Step:
