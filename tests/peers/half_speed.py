@@ -25,15 +25,17 @@ from tests.peers.on_the_plant import plant, px4_command, px4_settings
 
 SPEED = 0.5
 WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}  # it holds PX4 up where the disk is slow
-OWN_PHYSICS = WITHOUT_LOGGER | {
+PX4_SETTINGS = {
     "PX4_SYS_AUTOSTART": "10040",
     "PX4_SIM_MODEL": "sihsim_quadx",
-    "PX4_SIM_SPEED_FACTOR": str(SPEED),
     "PX4_PARAM_COM_RC_IN_MODE": "4",
     "PX4_PARAM_COM_OF_LOSS_T": "0.3",
     "PX4_PARAM_NAV_DLL_ACT": "0",
     "PX4_PARAM_COM_RCL_EXCEPT": "7",
     "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
+} | WITHOUT_LOGGER
+OWN_PHYSICS = PX4_SETTINGS | {
+    "PX4_SIM_SPEED_FACTOR": str(SPEED),
     "PX4_PARAM_COM_LOW_BAT_ACT": "0",
     "PX4_PARAM_SIM_BAT_MIN_PCT": "90",
     "PX4_PARAM_EKF2_NOAID_TOUT": "1000000",

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.peers.half_speed import WITHOUT_LOGGER
+from tests.peers.half_speed import PX4_SETTINGS
 from tests.peers.programs import ALONE, program_of
 
 pytestmark = pytest.mark.peers
@@ -34,15 +34,6 @@ COPTER_PARAMETERS = {
     "ATC_RAT_YAW_P": 0.3,
     "ATC_RAT_YAW_I": 0.02,
     "BATT_MONITOR": 4,
-}
-PX4_SETTINGS = {
-    "PX4_SYS_AUTOSTART": "10040",
-    "PX4_SIM_MODEL": "sihsim_quadx",
-    "PX4_PARAM_COM_RC_IN_MODE": "4",
-    "PX4_PARAM_COM_OF_LOSS_T": "0.3",
-    "PX4_PARAM_NAV_DLL_ACT": "0",
-    "PX4_PARAM_COM_RCL_EXCEPT": "7",
-    "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
 }
 PX4_INSTANCE = 9
 PX4_ALONE_M = {"sihsim": 0.066, "iris": 0.066, "hummingbird": 0.061}
@@ -104,9 +95,7 @@ def arducopter_on_the_plant(folder: Path, options: str) -> dict[str, Any]:
 def px4(folder: Path, options: str) -> dict[str, Any]:
     build = program_of("px4")
     vehicle = [str(build / "bin" / "px4"), "-i", str(PX4_INSTANCE), "-d", str(build / "etc")]
-    return fly(
-        folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:{14540 + PX4_INSTANCE}", **PX4_SETTINGS, **WITHOUT_LOGGER
-    )
+    return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:{14540 + PX4_INSTANCE}", **PX4_SETTINGS)
 
 
 @pytest.mark.parametrize(("on", "seconds"), [(arducopter, 60), (arducopter_on_the_plant, 40)])

@@ -62,9 +62,10 @@ def stream(sitl: Sitl, seconds: float, send: Callable[[], object]) -> None:
 
 
 def latest(sitl: Sitl, name: str) -> Any:
-    number = float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
+    """Request a message and return it."""
+    before, number = len(sitl.gcs.heard[name]), float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
     assert sitl.command(mav.MAV_CMD_REQUEST_MESSAGE, number) == ACCEPTED
-    sitl.run(0.02)
+    sitl.wait_until(lambda: len(sitl.gcs.heard[name]) > before, within=1.0, what=name)
     return sitl.gcs.latest(name)
 
 
