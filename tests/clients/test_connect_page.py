@@ -13,7 +13,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.flights.fleet_spec import GROUND_PORT, SDK_PORT
 from tests.clients.support.geometry import closest_m, place
 from tests.clients.support.mavproxy import MavProxy
-from tools.harness.processes import SitlProcess, vehicle
+from tools.harness.processes import vehicle
 
 PAGE = Path(__file__).parents[2] / "docs" / "ground-stations.md"
 GIVE_UP_AFTER_S = 120.0
@@ -42,31 +42,21 @@ def run(code: str, default_port: int, port: int, folder: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def assert_landed(flown: SitlProcess) -> None:
-    landed = flown.seen.wait_until_disarmed()
-    assert abs(landed.height_m) < 0.05
-
-
 def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
     assert snippets("# Connect")[0] == ".venv/bin/colibri sitl\n"
 
 
 @pytest.mark.long
-def test_mavsdk(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("section", "default_port", "height_m"), [("## MAVSDK", SDK_PORT, 5.0), ("## DroneKit", GROUND_PORT, 7.0)]
+)
+def test_a_first_program_flies(tmp_path: Path, section: str, default_port: int, height_m: float) -> None:
     port = free_port()
     with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
-        run(snippets("## MAVSDK")[0], SDK_PORT, port, tmp_path)
-        assert_landed(flown)
-        assert 4.8 < max(sight.height_m for sight in flown.seen.sights) < 5.1
-
-
-@pytest.mark.long
-def test_dronekit(tmp_path: Path) -> None:
-    port = free_port()
-    with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
-        run(snippets("## DroneKit")[0], GROUND_PORT, port, tmp_path)
-        assert_landed(flown)
+        run(snippets(section)[0], default_port, port, tmp_path)
+        assert abs(flown.seen.wait_until_disarmed().height_m) < 0.05
         assert flown.seen.modes()[-1] is Mode.LAND
+        assert -0.2 < max(sight.height_m for sight in flown.seen.sights) - height_m < 0.1
 
 
 @pytest.mark.clients
@@ -87,6 +77,6 @@ def test_mavproxy(tmp_path: Path) -> None:
         proxy.type(go, "DO_REPOSITION: ACCEPTED")
         flown.seen.wait(lambda sight: sight.height_m > 6.9 and hypot(*sight.velocity_enu_m_s) < 0.05, "the place")
         proxy.type(return_home, "NAV_RETURN_TO_LAUNCH: ACCEPTED")
-        assert_landed(flown)
+        assert abs(flown.seen.wait_until_disarmed().height_m) < 0.05
         assert closest_m(flown.seen.sights, place(47.3978, 8.5456, 7.0)) < 0.3
         assert hypot(*flown.seen.now.position_enu_m[:2]) < 0.3
