@@ -104,37 +104,34 @@ def test_a_bad_plant_link_changes_no_flight(forked: Launcher, processes: bool) -
     assert flown(launcher, fly_badly, airborne=3.0) == flown(None, fly, airborne=3.0)
 
 
-def test_a_flight_over_a_link_that_carries_nothing_ends() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        sitl.link.plant.down = True
-        with pytest.raises(SessionError, match="no message passes between plant and autopilot"):
-            sitl.step()
+@pytest.mark.sitl(airborne=3.0)
+def test_a_flight_over_a_link_that_carries_nothing_ends(sitl: Sitl) -> None:
+    sitl.link.plant.down = True
+    with pytest.raises(SessionError, match="no message passes between plant and autopilot"):
+        sitl.step()
 
 
-def test_sticks_are_held_whatever_is_done_meanwhile() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
-        with sitl.sticks_held():
-            sitl.run(0.3)
-            sitl.select(Mode.POSITION)
-            with sitl.sticks_held(pitch=1.0):
-                sitl.run(1.0)
-            assert sitl.velocity[1] > 1.0
-            sitl.wait_until(lambda: sitl.speed_m_s < 0.1, within=4.0)
-            assert sitl.mode is Mode.POSITION
-        sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=0.7)
-
-
-def test_what_the_vehicle_says_is_known_though_the_link_loses_it() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        sitl.link.ground.down = True
-        sitl.inject("motor", "off", 2)
+@pytest.mark.sitl(airborne=3.0)
+def test_sticks_are_held_whatever_is_done_meanwhile(sitl: Sitl) -> None:
+    sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
+    with sitl.sticks_held():
         sitl.run(0.3)
-        assert sitl.said("rotor 2 failed")
-        assert not sitl.gcs.said("rotor 2 failed")
+        sitl.select(Mode.POSITION)
+        with sitl.sticks_held(pitch=1.0):
+            sitl.run(1.0)
+        assert sitl.velocity[1] > 1.0
+        sitl.wait_until(lambda: sitl.speed_m_s < 0.1, within=4.0)
+        assert sitl.mode is Mode.POSITION
+    sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=0.7)
+
+
+@pytest.mark.sitl(airborne=3.0)
+def test_what_the_vehicle_says_is_known_though_the_link_loses_it(sitl: Sitl) -> None:
+    sitl.link.ground.down = True
+    sitl.inject("motor", "off", 2)
+    sitl.run(0.3)
+    assert sitl.said("rotor 2 failed")
+    assert not sitl.gcs.said("rotor 2 failed")
 
 
 def blown_and_laden(sitl: Sitl) -> None:
@@ -147,23 +144,21 @@ def blown_and_laden(sitl: Sitl) -> None:
     sitl.run(0.2)
 
 
-def test_wind_and_payload_change_in_flight() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        blown_and_laden(sitl)
-        t, east, up = (sitl.flown()[name] for name in ("t", "vx", "vz"))
-        assert east[t < 0.2].max() < 0.1 < east.max()
-        assert up[t < 0.5].min() - 0.1 > up.min()
-        assert (sitl.wind, sitl.payload_kg) == ("0.0@0.0", 0.0)
+@pytest.mark.sitl(airborne=3.0)
+def test_wind_and_payload_change_in_flight(sitl: Sitl) -> None:
+    blown_and_laden(sitl)
+    t, east, up = (sitl.flown()[name] for name in ("t", "vx", "vz"))
+    assert east[t < 0.2].max() < 0.1 < east.max()
+    assert up[t < 0.5].min() - 0.1 > up.min()
+    assert (sitl.wind, sitl.payload_kg) == ("0.0@0.0", 0.0)
 
 
-def test_a_world_that_there_is_not_is_refused() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        with pytest.raises(ValueError, match="wind must be SPEED@FROM in m/s and degrees, for example 5@270, not west"):
-            sitl.wind = "west"
-        with pytest.raises(ValueError, match="payload_kg must be from 0 to 100, not -1"):
-            sitl.payload_kg = -1
+@pytest.mark.sitl(airborne=3.0)
+def test_a_world_that_there_is_not_is_refused(sitl: Sitl) -> None:
+    with pytest.raises(ValueError, match="wind must be SPEED@FROM in m/s and degrees, for example 5@270, not west"):
+        sitl.wind = "west"
+    with pytest.raises(ValueError, match="payload_kg must be from 0 to 100, not -1"):
+        sitl.payload_kg = -1
 
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])

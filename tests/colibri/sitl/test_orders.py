@@ -3,8 +3,9 @@ from typing import Any
 import pytest
 
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
-from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.session import Flights
+from colibri.sitl.vehicle import Sitl
+from tests.support.refusals import refusal_of
 
 
 def test_a_takeoff_without_a_height_uses_the_parameter() -> None:
@@ -25,38 +26,36 @@ def test_sticks_are_heard_as_soon_as_they_are_held(ground: dict[str, float]) -> 
         assert sitl.mode == "position"
 
 
-def test_an_assertion_shows_the_vehicle() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        assert repr(sitl) == f"<vehicle 1: {sitl}>"
-        assert repr(sitl).startswith("<vehicle 1: t = 0.")
+@pytest.mark.sitl(airborne=3.0)
+def test_an_assertion_shows_the_vehicle(sitl: Sitl) -> None:
+    assert repr(sitl) == f"<vehicle 1: {sitl}>"
+    assert repr(sitl).startswith("<vehicle 1: t = 0.")
 
 
-def test_what_there_is_not_is_refused_with_what_there_is() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        sitl = flights.begin()
-        with pytest.raises(ValueError, match=r'^unknown mode "holdd" \(did you mean "hold"\?\)$'):
-            sitl.select("holdd")
-        with pytest.raises(ValueError, match=r'^unknown track "wavy" \(did you mean "wave"\?\)$'):
-            sitl.fly_track("wavy")
-        with pytest.raises(ValueError, match=r'^unknown unit of a failure "motorr" \(did you mean "motor"') as refused:
-            sitl.inject("motorr", "off")
-        assert refused.traceback[-1].ishidden(refused), "a test shows its own lines"
-        with pytest.raises(ValueError, match=r'^unknown message "COLISION" \(did you mean "COLLISION"'):
-            sitl.heard("COLISION")
-        with pytest.raises(sitl.Refused, match=r"^parameter MPC_CRUISE was refused: does not exist \(result 1\)$"):
-            sitl.set_param("MPC_CRUISE", 3.0)
-        with pytest.raises(ValueError, match=r"^seconds to fly must be from 0 on, not -1$"):
-            sitl.run(-1)
-        with pytest.raises(AttributeError, match=r'^unknown attribute to set "wimd" .*"wind"'):
-            setattr(sitl, "wimd", "5@270")  # noqa: B010 - a checker refuses it, too
-        with pytest.raises(AttributeError, match=r'unknown link "grund" .did you mean "ground"'):
-            sitl.link.grund.loss = 0.1
-        with pytest.raises(AttributeError, match=r'unknown fault of a link "lost" .did you mean "loss"'):
-            sitl.link.ground.lost = 0.1
-        for name, value in {"loss": 3, "delay_s": -1.0, "jitter_s": "1"}.items():
-            with pytest.raises(ValueError, match=f"^{name} of a link must be from 0 .*, not {value!r}"):
-                setattr(sitl.link.ground, name, value)
+@pytest.mark.sitl(airborne=3.0)
+def test_what_there_is_not_is_refused_with_what_there_is(sitl: Sitl) -> None:
+    with pytest.raises(ValueError, match=r'^unknown mode "holdd" \(did you mean "hold"\?\)$'):
+        sitl.select("holdd")
+    with pytest.raises(ValueError, match=r'^unknown track "wavy" \(did you mean "wave"\?\)$'):
+        sitl.fly_track("wavy")
+    with pytest.raises(ValueError, match=r'^unknown unit of a failure "motorr" \(did you mean "motor"') as refused:
+        sitl.inject("motorr", "off")
+    assert refused.traceback[-1].ishidden(refused), "a test shows its own lines"
+    with pytest.raises(ValueError, match=r'^unknown message "COLISION" \(did you mean "COLLISION"'):
+        sitl.heard("COLISION")
+    with pytest.raises(sitl.Refused, match=r"^parameter MPC_CRUISE was refused: does not exist \(result 1\)$"):
+        sitl.set_param("MPC_CRUISE", 3.0)
+    with pytest.raises(ValueError, match=r"^seconds to fly must be from 0 on, not -1$"):
+        sitl.run(-1)
+    with pytest.raises(AttributeError, match=r'^unknown attribute to set "wimd" .*"wind"'):
+        setattr(sitl, "wimd", "5@270")  # noqa: B010 - a checker refuses it, too
+    with pytest.raises(AttributeError, match=r'unknown link "grund" .did you mean "ground"'):
+        sitl.link.grund.loss = 0.1
+    with pytest.raises(AttributeError, match=r'unknown fault of a link "lost" .did you mean "loss"'):
+        sitl.link.ground.lost = 0.1
+    for name, value in {"loss": 3, "delay_s": -1.0, "jitter_s": "1"}.items():
+        with pytest.raises(ValueError, match=f"^{name} of a link must be from 0 .*, not {value!r}"):
+            setattr(sitl.link.ground, name, value)
 
 
 @pytest.mark.parametrize(
@@ -70,10 +69,9 @@ def test_what_there_is_not_is_refused_with_what_there_is() -> None:
         (("motor", "wrong", 1, 3.0), "remaining fraction must be 0.001 to 1"),
     ],
 )
-def test_a_refused_failure_says_what_is_possible(failure: tuple[Any, ...], reason: str) -> None:
-    with Flights(Setting(airborne=3.0), None) as flights, pytest.raises(RefusedError) as refused:
-        flights.begin().inject(*failure)
-    assert f"was refused: {reason}" in str(refused.value)
+@pytest.mark.sitl(airborne=3.0)
+def test_a_refused_failure_says_what_is_possible(sitl: Sitl, failure: tuple[Any, ...], reason: str) -> None:
+    assert f"was refused: {reason}" in refusal_of(sitl.inject, *failure)
 
 
 @pytest.mark.parametrize(
@@ -90,9 +88,7 @@ def test_a_refused_failure_says_what_is_possible(failure: tuple[Any, ...], reaso
     ],
 )
 def test_what_no_flight_begins_with(mark: dict[str, Any], line: str) -> None:
-    with pytest.raises(SettingError) as refused:
-        setting_of([mark])
-    assert str(refused.value).startswith(line)
+    assert refusal_of(setting_of, [mark]).startswith(line)
 
 
 def test_what_differs_for_one_flight_is_read_as_a_mark() -> None:
