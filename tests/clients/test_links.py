@@ -1,23 +1,13 @@
 """A TCP server, with pymavlink and with MAVSDK; MAVSDK with a vehicle that is no PX4."""
 
 import socket
-import sys
 from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
-from tests.clients.support.client import Client
+from tests.clients.support.client import run_script
 from tools.harness.processes import vehicle
-
-ROOT = Path(__file__).parents[2]
-WITHIN_S = 120.0  # a wall-clock bound for what hangs
-
-
-def run(script: str, url: str, folder: Path) -> None:
-    command = [sys.executable, "-m", "tests.clients.mavsdk_scripts", script, url]
-    with Client(command, folder, {"PYTHONPATH": str(ROOT)}) as client:
-        client.wait(WITHIN_S)
 
 
 class Wire:
@@ -46,7 +36,7 @@ def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_mavsdk_over_tcp(tmp_path: Path) -> None:
     with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=3.0) as flown:
-        run("flights.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
+        run_script("flights.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
         flown.seen.wait_until_disarmed()
         assert 4.7 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
@@ -54,6 +44,6 @@ def test_mavsdk_over_tcp(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
-        run("flights.generic", flown.mavsdk_url, tmp_path)
+        run_script("flights.generic", flown.mavsdk_url, tmp_path)
         flown.seen.wait_until_disarmed()
         assert 2.7 < max(sight.height_m for sight in flown.seen.sights) < 3.1

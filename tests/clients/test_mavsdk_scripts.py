@@ -1,6 +1,5 @@
 """Scripts for MAVSDK 4, each in a process of its own, against `colibri sitl`; what counts is what the vehicle did."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import degrees, hypot, pi
@@ -12,14 +11,12 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from tests.clients.mavsdk_scripts import flights, offboard, services
-from tests.clients.support.client import Client
+from tests.clients.support.client import run_script
 from tests.clients.support.geometry import away_m, closest_m, during, heading_deg, speed_m_s, swept_rad
 from tools.harness.observer import Observer
 from tools.harness.processes import SitlProcess, vehicle
 
-ROOT = Path(__file__).parents[2]
 SPEED = 3.0  # times real time: MAVSDK's own time-outs run on the wall clock, and still find the vehicle prompt
-WITHIN_S = 120.0
 PATIENT_S = 5.0
 """A companion may be silent for so long, simulated: it lives on a clock that is slower, beside other tests."""
 ACCEPTANCE_M = 0.3  # so close to the height, a take-off has ended
@@ -29,9 +26,7 @@ HOME: Vector = (0.0, 0.0, 0.0)
 def run(name: str, flown: SitlProcess, folder: Path) -> None:
     room = folder / name
     room.mkdir()
-    command = [sys.executable, "-m", "tests.clients.mavsdk_scripts", name, flown.mavsdk_url]
-    with Client(command, room, {"PYTHONPATH": str(ROOT)}) as client:
-        client.wait(WITHIN_S)
+    run_script(name, flown.mavsdk_url, room)
 
 
 @contextmanager

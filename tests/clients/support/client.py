@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Self
 from tools.harness.processes import wait_for
 
 _SECONDS_PER_HOUR = 3600.0
+_ROOT = Path(__file__).parents[3]
+_SCRIPT_WITHIN_S = 120.0  # a wall-clock bound for what hangs
 
 
 class Client:
@@ -65,3 +68,10 @@ class Client:
         self.process.wait()
         if self.process.stdin:
             self.process.stdin.close()
+
+
+def run_script(name: str, url: str, folder: Path) -> None:
+    """Run a script of `tests.clients.mavsdk_scripts` to its end."""
+    command = [sys.executable, "-m", "tests.clients.mavsdk_scripts", name, url]
+    with Client(command, folder, {"PYTHONPATH": str(_ROOT)}) as client:
+        client.wait(_SCRIPT_WITHIN_S)
