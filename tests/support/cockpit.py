@@ -30,6 +30,7 @@ from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import ACCEPTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import Refusal, mav
 from colibri.plant.vehicle.description import load_vehicle
+from colibri.sitl.mission_items import Item
 
 PREVIEW = Preview(20_000, 5)
 GROUND = Peer(0, 255, 190)
@@ -44,13 +45,7 @@ def at(position: Vector, velocity: Vector = _NOTHING, yaw_rad: float = 0.0) -> V
 
 
 def item(command: str, *params: float, place: Vector | None = None) -> MissionItem:
-    p1, p2, p3, p4 = (*params, *(0.0,) * (4 - len(params)))
-    number = getattr(mav, f"MAV_CMD_{command}")
-    if place is None:
-        return MissionItem(mav.MAV_FRAME_MISSION, number, 1, p1, p2, p3, p4, 0, 0, 0.0)
-    there = geodetic_of((place[0], place[1], 0.0), DEFAULT_ORIGIN)
-    x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
-    return MissionItem(mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, number, 1, p1, p2, p3, p4, x, y, place[2])
+    return Item(getattr(mav, f"MAV_CMD_{command}"), params, place).on_wire(DEFAULT_ORIGIN)
 
 
 class Cockpit:

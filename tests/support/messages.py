@@ -1,5 +1,6 @@
 """What the tests of services need: messages as they arrive, and arbitrary ones."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from hypothesis import strategies as st
@@ -27,7 +28,7 @@ def command_int(command: int, *params: float, frame: int = 0, x: int = 0, y: int
     return message("COMMAND_INT", 1, 1, frame, command, 0, 0, *params, *(0.0,) * (4 - len(params)), x, y, z)
 
 
-def on_the_wire(sends: list[Send]) -> list[Message]:
+def on_the_wire(sends: Iterable[Send]) -> list[Message]:
     """Return messages that are sent as they arrive: they can be encoded."""
     codec = Codec(1, 1)
     return [received for send in sends for received in codec.decode(codec.encode(send.name, *send.fields))]

@@ -7,9 +7,10 @@ from typing import Any
 from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, StoredPlan
 from colibri.mavlink.mission.service import MissionProgress, MissionService, MissionVehicle
 from colibri.mavlink.mission.upload import Rules
-from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Codec, Message, Refusal, mav
+from tests.support.messages import message, on_the_wire
 
 VEHICLE = (1, 1)
 FIRST = Peer(0, 255, 190)
@@ -53,15 +54,11 @@ class Ground:
         return self.guided
 
     def hear(self, peer: Peer, name: str, *fields: Any) -> list[Message]:
-        (message,) = Codec(peer.system, peer.component).decode(Codec(*peer[1:]).encode(name, *fields))
-        return self.decoded(self.service.receive(message, peer, self.now_us))
+        return on_the_wire(self.service.receive(message(name, *fields, peer=peer), peer, self.now_us))
 
     def poll(self, after_us: int = 0) -> list[Message]:
         self.now_us += after_us
-        return self.decoded(self.service.poll(self.now_us))
-
-    def decoded(self, sends: Iterable[Send]) -> list[Message]:
-        return [message for send in sends for message in self.codec.decode(self.codec.encode(send.name, *send.fields))]
+        return on_the_wire(self.service.poll(self.now_us))
 
 
 def fielded(item: MissionItem, plan_type: int = 0, current: int = 0) -> tuple[Any, ...]:

@@ -16,12 +16,13 @@ from colibri.autopilot.guidance.mission.executor import (
 from colibri.autopilot.guidance.mission.items import COPTER_RULES, FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import mav
+from colibri.sitl.mission_items import Item
 
 STEP_US = 20_000
 HOME = (2.0, -3.0, 0.5)
@@ -30,13 +31,9 @@ HOME = (2.0, -3.0, 0.5)
 def item(
     command: str, place: Vector | None = None, p1: float = nan, p2: float = nan, p3: float = nan, p4: float = nan
 ) -> MissionItem:
-    number = getattr(mav, f"MAV_CMD_{command}")
-    if place is None:
-        return MissionItem(2, number, 1, p1, p2, p3, p4, 0, 0, 0.0)
-    east, north, up = place
-    there = geodetic_of((HOME[0] + east, HOME[1] + north, 0.0), DEFAULT_ORIGIN)
-    x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
-    return MissionItem(6, number, 1, p1, p2, p3, p4, x, y, up)
+    """Return an item at a place that is relative to home."""
+    there = None if place is None else (HOME[0] + place[0], HOME[1] + place[1], place[2])
+    return Item(getattr(mav, f"MAV_CMD_{command}"), (p1, p2, p3, p4), there).on_wire(DEFAULT_ORIGIN)
 
 
 class Flight:

@@ -11,6 +11,7 @@ from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RAL
 from colibri.mavlink.mission.upload import GIVES_WAY_AFTER_US, Rules
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import Codec, mav
+from tests.support.messages import on_the_wire
 from tests.support.mission_ends import (
     CANCELLED,
     FIRST,
@@ -315,5 +316,5 @@ def test_version_1_frames_are_about_the_mission() -> None:
     old = mav.MAVLink(None, srcSystem=255, srcComponent=190)
     frame = mav.MAVLink_mission_count_message(1, 1, 2, 0).pack(old, force_mavlink1=True)
     (message,) = Codec(1, 1).decode(frame)
-    answers = ground.decoded(ground.service.receive(message, FIRST, 0))
+    answers = on_the_wire(ground.service.receive(message, FIRST, 0))
     assert asked(answers) == [("MISSION_REQUEST_INT", 0)]
