@@ -38,7 +38,7 @@ def test_the_page_of_keys_has_every_control_law_that_comes_along() -> None:
     assert {*keys.LAWS} == {*controller_names()}
 
 
-def test_the_page_of_files_has_every_column_of_the_csv_and_every_key_of_the_report() -> None:
+def test_the_page_of_files_has_every_column_and_every_key() -> None:
     (returned,) = (node for node in ast.walk(ast.parse(getsource(report))) if isinstance(node, ast.Return))
     assert isinstance(returned.value, ast.Dict)
     keys_of_report = [

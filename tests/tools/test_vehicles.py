@@ -39,7 +39,7 @@ def test_the_baseline_flies_slow_rotors(vehicle: str, trial: str) -> None:
     assert flown.swing_rad_s < 0.5
 
 
-def test_the_hummingbird_has_the_numbers_to_which_the_law_was_tuned() -> None:
+def test_the_hummingbird_has_the_numbers_of_the_tuning() -> None:
     found = scaled("lpv-mpc", TABLE, load_vehicle("hummingbird"))
     assert found["guidance"]["poles"] == [-7.0, -8.0]
     assert found["guidance"]["max_acceleration_m_s2"] == 14.0

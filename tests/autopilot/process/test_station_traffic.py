@@ -23,7 +23,7 @@ def frames(folder: Path) -> list[tuple[int, bytes]]:
     return [(each.time_us, each.frame) for each in decode((folder / TRAFFIC).read_bytes())]
 
 
-def test_whole_frames_are_kept_beside_those_of_the_plant_and_no_key(tmp_path: Path) -> None:
+def test_frames_of_station_and_plant_are_kept_without_a_key(tmp_path: Path) -> None:
     plant = TlogWriter(tmp_path / TRAFFIC, shared=True)
     traffic = StationTraffic(tmp_path, 1_000_000)
     plant.write(1, [BEAT])

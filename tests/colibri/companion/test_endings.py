@@ -108,7 +108,7 @@ def test_hold_is_refused_three_times_before_land(refusals: int, mode: int) -> No
     assert ride.sitl.mode == mode
 
 
-def test_a_stream_that_another_station_has_ended_is_requested_again() -> None:
+def test_a_stream_that_another_station_ended_is_requested_again() -> None:
     ride = hovering(CompanionSettings(stay=Stay(), dry_run=True))
     ride.until(lambda: ride.companion.phase is CompanionPhase.CHECKING, 8.0)
     del ride.sitl.streams["SYS_STATUS"]
@@ -227,7 +227,7 @@ def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str
     assert message in ride.companion.said[-2] or limit == "late states"
 
 
-def test_body_rates_that_stand_still_end_the_flight_before_it_leans() -> None:
+def test_stuck_body_rates_end_the_flight_before_it_leans() -> None:
     ride = hovering()
     ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
     ride.sitl.frozen_rate = (0.0, 1.5, 0.0)
