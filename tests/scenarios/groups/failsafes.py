@@ -6,18 +6,16 @@ from colibri.sitl import mission_items
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
-from tests.scenarios.words.scenario import Scenario, Step
+from tests.scenarios.words.scenario import Scenario
 
 PLACE = (0.0, 0.0, 5.0)
 IN_THE_AIR = {"airborne": 5.0}
 
 
-def charge_is(state: int) -> Step:
-    def step(sitl: Sitl) -> None:
-        sitl.run(1.1)
-        assert sitl.gcs.latest("BATTERY_STATUS").charge_state == state
-
-    return step
+@do.word
+def charge_is(sitl: Sitl, state: int) -> None:
+    sitl.run(1.1)
+    assert sitl.gcs.latest("BATTERY_STATUS").charge_state == state
 
 
 SCENARIOS = (

@@ -26,29 +26,24 @@ def touches_down_slower(m_s: float) -> Step:
     return do.measured("the speed at the ground", fastest, m_s)
 
 
-def lands_on_three(number: int, *, tilt: float, within_s: float) -> Step:
+@do.word
+def lands_on_three(sitl: Sitl, number: int, *, tilt: float, within_s: float) -> None:
     """Lose a rotor, and see it say so, land, and point its thrust straight up from so long after the loss on."""
-
-    def step(sitl: Sitl) -> None:
-        sitl.inject("system_motor", "off", number)
-        upright_s = sitl.time_s + within_s
-        do.until(see.says(f"rotor {number} failed"), within=0.5)(sitl)
-        do.until(see.DISARMED, within=40.0)(sitl)
-        do.measured("the tilt", max_tilt_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
-
-    return step
+    sitl.inject("system_motor", "off", number)
+    upright_s = sitl.time_s + within_s
+    do.until(see.says(f"rotor {number} failed"), within=0.5)(sitl)
+    do.until(see.DISARMED, within=40.0)(sitl)
+    do.measured("the tilt", max_tilt_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
 
 
 def max_tilt_in_the_air(columns: Columns) -> float:
     return float(tilt_deg(columns)[columns["z"] > 0.1].max())
 
 
-def descends_less(max_m: float, seconds: float) -> Step:
-    def step(sitl: Sitl) -> None:
-        began_m = sitl.position[2]
-        sitl.hold(lambda: sitl.position[2] > began_m - max_m, for_=seconds, what=f"at most {max_m:g} m lost")
-
-    return step
+@do.word
+def descends_less(sitl: Sitl, max_m: float, seconds: float) -> None:
+    began_m = sitl.position[2]
+    sitl.hold(lambda: sitl.position[2] > began_m - max_m, for_=seconds, what=f"at most {max_m:g} m lost")
 
 
 SCENARIOS = (

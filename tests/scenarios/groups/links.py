@@ -10,7 +10,7 @@ from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import holding, missions, offboard, takeoff_land
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
-from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
+from tests.scenarios.words.scenario import FleetScenario, Scenario
 
 PLACE = (0.0, 0.0, 5.0)
 ROUGH = {"loss": 0.3, "jitter_s": 0.05}
@@ -61,14 +61,12 @@ def is_not_moved(sitl: Sitl) -> None:
     sitl.run(1.0)
 
 
-def lands_after(kills: int, every_s: float) -> Step:
-    def step(sitl: Sitl) -> None:
-        for _ in range(kills):
-            sitl.run(every_s)
-            sitl.kill_autopilot()
-        sitl.wait_until(lambda: not sitl.armed, within=80.0, what="the end of the mission")
-
-    return step
+@do.word
+def lands_after(sitl: Sitl, kills: int, every_s: float) -> None:
+    for _ in range(kills):
+        sitl.run(every_s)
+        sitl.kill_autopilot()
+    sitl.wait_until(lambda: not sitl.armed, within=80.0, what="the end of the mission")
 
 
 SCENARIOS: tuple[Scenario | FleetScenario, ...] = (

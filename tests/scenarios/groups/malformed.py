@@ -14,7 +14,7 @@ from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
-from tests.scenarios.words.scenario import Scenario, Step
+from tests.scenarios.words.scenario import Scenario
 from tools.fuzz.messages import Messages
 
 PLACE = (0.0, 0.0, 5.0)
@@ -36,17 +36,15 @@ def send_noise(sitl: Sitl) -> None:
             sitl.step()
 
 
-def fire(count: int) -> Step:
-    def step(sitl: Sitl) -> None:
-        messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MAX_COMMANDS))
-        for number in range(count):
-            sent = messages.any()
-            if sent.name != "SETUP_SIGNING":  # a valid one is the owner's wish: without its key nobody is answered
-                sitl.gcs.send_raw(sent.frame)
-            if number % 20 == 0:
-                sitl.step()
-
-    return step
+@do.word
+def fire(sitl: Sitl, count: int) -> None:
+    messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MAX_COMMANDS))
+    for number in range(count):
+        sent = messages.any()
+        if sent.name != "SETUP_SIGNING":  # a valid one is the owner's wish: without its key nobody is answered
+            sitl.gcs.send_raw(sent.frame)
+        if number % 20 == 0:
+            sitl.step()
 
 
 def still_answers(sitl: Sitl) -> None:
@@ -56,14 +54,12 @@ def still_answers(sitl: Sitl) -> None:
     assert sitl.get_param("SYS_AUTOSTART") == 4001
 
 
-def parameter_refused(name: str, value: float) -> Step:
-    def step(sitl: Sitl) -> None:
-        before = sitl.get_param(name)
-        with pytest.raises(RefusedError):
-            sitl.set_param(name, value)
-        assert sitl.get_param(name) == before
-
-    return step
+@do.word
+def parameter_refused(sitl: Sitl, name: str, value: float) -> None:
+    before = sitl.get_param(name)
+    with pytest.raises(RefusedError):
+        sitl.set_param(name, value)
+    assert sitl.get_param(name) == before
 
 
 def many_items_refused(sitl: Sitl) -> None:

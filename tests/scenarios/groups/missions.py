@@ -6,7 +6,7 @@ from colibri.sitl.flight_record import Columns
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
-from tests.scenarios.words.scenario import Scenario, Step
+from tests.scenarios.words.scenario import Scenario
 
 SQUARE = ((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0))
 CORRIDOR = [mission_items.waypoint(east, north, 10.0, within_m=1.0) for east, north in SQUARE]
@@ -28,14 +28,12 @@ def off_the_square(columns: Columns) -> float:
     return float((nearest * inside + outside * ~inside).max())
 
 
-def reads_back(count: int) -> Step:
-    def step(sitl: Sitl) -> None:
-        sitl.gcs.forget()
-        ask = do.at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
-        sitl.wait_until(lambda: ask(sitl) or sitl.heard("MISSION_COUNT"), within=10.0, what="MISSION_COUNT")
-        assert sitl.gcs.latest("MISSION_COUNT").count == count
-
-    return step
+@do.word
+def reads_back(sitl: Sitl, count: int) -> None:
+    sitl.gcs.forget()
+    ask = do.at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
+    sitl.wait_until(lambda: ask(sitl) or sitl.heard("MISSION_COUNT"), within=10.0, what="MISSION_COUNT")
+    assert sitl.gcs.latest("MISSION_COUNT").count == count
 
 
 def changes_mode_while_it_uploads(sitl: Sitl) -> None:

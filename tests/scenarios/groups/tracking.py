@@ -47,24 +47,20 @@ def follows_by_its_estimate(sitl: Sitl, max_m: float) -> None:
     assert np.sqrt(np.mean(np.sum(off**2, axis=1))) <= max_m
 
 
-def circles_at(m_s: float, within_m_s: float) -> Step:
-    def step(sitl: Sitl) -> None:
-        columns = sitl.flown(sitl.time_s - 10.0)
-        speed = np.hypot(columns["vx"], columns["vy"])
-        assert abs(speed - m_s).max() <= within_m_s
-
-    return step
+@do.word
+def circles_at(sitl: Sitl, m_s: float, within_m_s: float) -> None:
+    columns = sitl.flown(sitl.time_s - 10.0)
+    speed = np.hypot(columns["vx"], columns["vy"])
+    assert abs(speed - m_s).max() <= within_m_s
 
 
-def yaw_turns_through(min_deg: float) -> Step:
-    def step(sitl: Sitl) -> None:
-        columns = sitl.flown()
-        w, x, y, z = (columns[name] for name in ("qw", "qx", "qy", "qz"))
-        yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-        assert degrees(abs(yaw[-1] - yaw[0])) >= min_deg
-        assert abs(columns["r"]).max() < 4.0
-
-    return step
+@do.word
+def yaw_turns_through(sitl: Sitl, min_deg: float) -> None:
+    columns = sitl.flown()
+    w, x, y, z = (columns[name] for name in ("qw", "qx", "qy", "qz"))
+    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    assert degrees(abs(yaw[-1] - yaw[0])) >= min_deg
+    assert abs(columns["r"]).max() < 4.0
 
 
 FAST = "lemniscate:size=4,height=3,lap=2"

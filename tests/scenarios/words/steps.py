@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import dist, inf, nan, radians
 from operator import methodcaller
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 import pytest
@@ -14,6 +14,13 @@ from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.conditions import Condition
 from tests.scenarios.words.scenario import Step
+
+P = ParamSpec("P")
+
+
+def word(act: Callable[Concatenate[Sitl, P], object]) -> Callable[P, Step]:
+    """Return what makes a step of an act: it takes what is given beside the vehicle."""
+    return lambda *given, **options: lambda sitl: act(sitl, *given, **options)
 
 
 def _order(method: str) -> Callable[..., Step]:
@@ -34,22 +41,18 @@ def goto(place: Vector, *, yaw_deg: float = nan, speed: float = -1.0, wait: bool
     return lambda sitl: sitl.goto(*place, yaw=radians(yaw_deg), speed=speed, wait=wait)
 
 
-def command(number: int, *params: float, result: int) -> Step:
-    def step(sitl: Sitl) -> None:
-        got = sitl.command(number, *params)
-        assert got == result, f"command {number} had result {got}, not {result}: {sitl}"
-
-    return step
+@word
+def command(sitl: Sitl, number: int, *params: float, result: int) -> None:
+    got = sitl.command(number, *params)
+    assert got == result, f"command {number} had result {got}, not {result}: {sitl}"
 
 
-def refused(step: Step, because: str) -> Step:
-    def attempt(sitl: Sitl) -> None:
-        before = len(sitl.texts)
-        with pytest.raises(RefusedError) as refusal:
-            step(sitl)
-        assert because in f"{refusal.value} {sitl.texts[before:]}"
-
-    return attempt
+@word
+def refused(sitl: Sitl, step: Step, because: str) -> None:
+    before = len(sitl.texts)
+    with pytest.raises(RefusedError) as refusal:
+        step(sitl)
+    assert because in f"{refusal.value} {sitl.texts[before:]}"
 
 
 def until(condition: Condition, *, within: float, meanwhile: Step = _nothing) -> Step:
@@ -68,80 +71,67 @@ def _beside(step: Step, condition: Condition, sitl: Sitl) -> Callable[[], bool]:
     return holds
 
 
-def moves_less(max_m: float, seconds: float, tilt: float = 90.0) -> Step:
-    def step(sitl: Sitl) -> None:
-        began = sitl.position
-        near_and_level = lambda: dist(sitl.position, began) <= max_m and sitl.tilt_deg <= tilt  # noqa: E731
-        sitl.hold(near_and_level, for_=seconds, what=f"at most {max_m:g} m away")
-
-    return step
+@word
+def moves_less(sitl: Sitl, max_m: float, seconds: float, tilt: float = 90.0) -> None:
+    began = sitl.position
+    near_and_level = lambda: dist(sitl.position, began) <= max_m and sitl.tilt_deg <= tilt  # noqa: E731
+    sitl.hold(near_and_level, for_=seconds, what=f"at most {max_m:g} m away")
 
 
-def check(condition: Condition) -> Step:
-    def step(sitl: Sitl) -> None:
-        assert condition.holds(sitl), f"not so: {condition.words}: {sitl}"
-
-    return step
+@word
+def check(sitl: Sitl, condition: Condition) -> None:
+    assert condition.holds(sitl), f"not so: {condition.words}: {sitl}"
 
 
-def at_every(seconds: float, step: Step) -> Step:
+@word
+def at_every(sitl: Sitl, seconds: float, step: Step) -> None:
     """Do something so often; to be used beside `until` and `hold`."""
-
-    def now_and_then(sitl: Sitl) -> None:
-        if sitl.time_us % round(seconds * 1e6) == 0:
-            step(sitl)
-
-    return now_and_then
+    if sitl.time_us % round(seconds * 1e6) == 0:
+        step(sitl)
 
 
-def by_hand(step: Step, **axes: float) -> Step:
+@word
+def by_hand(sitl: Sitl, /, step: Step, **axes: float) -> None:
     """Do something while the sticks are held: see `Sitl.stick`."""
-
-    def held(sitl: Sitl) -> None:
-        with sitl.sticks_held(**axes):
-            step(sitl)
-
-    return held
+    with sitl.sticks_held(**axes):
+        step(sitl)
 
 
 def setpoint(**what: Any) -> Step:
     return at_every(0.02, lambda sitl: sitl.setpoint(**what))
 
 
-def trouble(link: str, **what: float | bool) -> Step:
-    def step(sitl: Sitl) -> None:
-        for name, value in what.items():
-            setattr(getattr(sitl.link, link), name, value)
-
-    return step
+@word
+def trouble(sitl: Sitl, /, link: str, **what: float | bool) -> None:
+    for name, value in what.items():
+        setattr(getattr(sitl.link, link), name, value)
 
 
-def silence(*, still: bool = True) -> Step:
-    def step(sitl: Sitl) -> None:
-        sitl.gcs.silent = still
-
-    return step
+@word
+def silence(sitl: Sitl, *, still: bool = True) -> None:
+    sitl.gcs.silent = still
 
 
+@word
 def measured(
-    words: str, of: Callable[[Columns], float], maximum: float, *, minimum: float = -inf, last_s: float | None = None
-) -> Step:
+    sitl: Sitl,
+    words: str,
+    of: Callable[[Columns], float],
+    maximum: float,
+    *,
+    minimum: float = -inf,
+    last_s: float | None = None,
+) -> None:
     """See that a figure of what was flown, or of the last seconds of it, is within bounds."""
-
-    def step(sitl: Sitl) -> None:
-        columns = sitl.flown(0.0 if last_s is None else sitl.time_s - last_s)
-        figure = of(columns)
-        assert minimum <= figure <= maximum, f"{words} is {figure:.4g}, not {minimum:g} to {maximum:g}: {sitl}"
-
-    return step
+    columns = sitl.flown(0.0 if last_s is None else sitl.time_s - last_s)
+    figure = of(columns)
+    assert minimum <= figure <= maximum, f"{words} is {figure:.4g}, not {minimum:g} to {maximum:g}: {sitl}"
 
 
-def then(*steps: Step) -> Step:
-    def step(sitl: Sitl) -> None:
-        for each in steps:
-            each(sitl)
-
-    return step
+@word
+def then(sitl: Sitl, *steps: Step) -> None:
+    for each in steps:
+        each(sitl)
 
 
 def places(columns: Columns) -> Array:
