@@ -3,14 +3,12 @@
 import ast
 import os
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
-from tests.support.pages import ROOT
+from tests.support.pages import ROOT, run
 from tools.harness.processes import vehicle
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -24,14 +22,6 @@ SPEED = 3.0  # of vehicles for clients, times real time
 def promised(path: Path) -> str:
     said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     return dedent(said.partition("Prints:\n")[2]).strip()
-
-
-def printed(folder: Path, *command: str) -> str:
-    command = (sys.executable, *command)
-    shell = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
-    done = subprocess.run(command, cwd=folder, env=shell, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout.strip()
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
@@ -49,16 +39,16 @@ def test_example_prints_what_it_says(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     if path.stem == LEARNS:
-        assert printed(tmp_path, str(path), "2").startswith("lost: ")
+        assert run(tmp_path, str(path), "2").startswith("lost: ")
     elif path.stem.startswith("test_"):
         pytest_of = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-c", os.devnull)
-        assert promised(path) in printed(tmp_path, *pytest_of, f"--rootdir={tmp_path}", str(path))
+        assert promised(path) in run(tmp_path, *pytest_of, f"--rootdir={tmp_path}", str(path))
     elif path.stem.endswith("_takeoff"):
         with vehicle(tmp_path, speed=SPEED) as flown:
             url = flown.mavsdk_url if path.stem.startswith("mavsdk") else f"udpout:127.0.0.1:{flown.port}"
-            assert printed(tmp_path, str(path), url) == promised(path)
+            assert run(tmp_path, str(path), url).strip() == promised(path)
     elif path.stem == STARTS_PROCESSES:
-        assert printed(tmp_path, str(path)) == promised(path)
+        assert run(tmp_path, str(path)).strip() == promised(path)
     else:
         monkeypatch.chdir(tmp_path)
         runpy.run_path(str(path), run_name="__main__")

@@ -1,6 +1,5 @@
 """Snippets of README and docs/: Python compiles, TOML is read; those of tutorials are run as they stand."""
 
-import os
 import re
 import subprocess
 import sys
@@ -9,24 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.pages import DOCS, ROOT, blocks
+from tests.support.pages import DOCS, ROOT, blocks, run
 
 
 def python_of(page: str) -> list[str]:
     found = [block.text for block in blocks("python") if block.page == page]
     assert found
     return found
-
-
-def run(folder: Path, *command: str) -> str:
-    """Run a command of Python in a folder, as in a user's shell; it must go well; return what it says."""
-    shell = {
-        name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"
-    }  # commands of colibri set it
-    command = (sys.executable, *command)
-    done = subprocess.run(command, cwd=folder, env=shell, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def test_python_compiles() -> None:

@@ -1,6 +1,9 @@
 """README and the pages of docs/, and what is in them: fenced blocks, prose, links, headings."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -43,3 +46,12 @@ def anchors(path: Path) -> set[str]:
         number = next(n for n in range(len(found) + 1) if (f"{anchor}-{n}" if n else anchor) not in found)
         found.add(f"{anchor}-{number}" if number else anchor)
     return found
+
+
+def run(folder: Path, *command: str) -> str:
+    """Run a command of Python in a folder, as in a user's shell; it must go well; return what it says."""
+    shell = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}  # which colibri sets
+    command = (sys.executable, *command)
+    done = subprocess.run(command, cwd=folder, env=shell, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
