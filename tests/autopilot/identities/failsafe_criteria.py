@@ -2,6 +2,7 @@
 
 from math import dist, hypot, nan
 
+from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
@@ -63,25 +64,23 @@ def return_to_rally(sitl: Sitl) -> None:
 
 
 def circle_fence(sitl: Sitl) -> None:
-    sitl.set_param("FENCE_ENABLE", 1)
-    sitl.takeoff(10.0)
-    velocity(sitl, 8.0, 0.0, 0.0)
-    while shown(sitl) != RTL:
-        velocity(sitl, 8.0, 0.0, 0.0)
-        sitl.run(1.0)
-        assert sitl.time_us < 120e6
+    leaves_the_fence(sitl, (8.0, 0.0, 0.0))
     assert latest(sitl, "FENCE_STATUS").breach_status
     home_and_disarmed(sitl)
 
 
 def height_fence(sitl: Sitl) -> None:
+    leaves_the_fence(sitl, (0.0, 0.0, -2.0))
+    home_and_disarmed(sitl)
+
+
+def leaves_the_fence(sitl: Sitl, velocity_ned_m_s: Vector) -> None:
     sitl.set_param("FENCE_ENABLE", 1)
     sitl.takeoff(10.0)
     while shown(sitl) != RTL:
-        velocity(sitl, 0.0, 0.0, -2.0)
+        velocity(sitl, *velocity_ned_m_s)
         sitl.run(1.0)
         assert sitl.time_us < 120e6
-    home_and_disarmed(sitl)
 
 
 def floor_fence(sitl: Sitl) -> None:
