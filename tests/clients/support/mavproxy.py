@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from tests.clients.support.client import Client
@@ -35,9 +34,7 @@ class MavProxy:
         self.expect(r"Received \d+ parameters")
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._client.end()
 
     def type(self, line: str, pattern: str) -> re.Match[str]:
