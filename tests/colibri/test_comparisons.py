@@ -57,12 +57,8 @@ def test_a_track_names_a_folder(name: str, folder: str) -> None:
 def test_only_what_is_asked_for_is_drawn(tmp_path: Path) -> None:
     assert main(["figures", "--only", "4.9", "--only", "A.7", "--out", str(tmp_path), "--quiet"]) == 0
     drawn = {path.name for path in tmp_path.iterdir() if path.is_file()}
-    assert drawn == {
-        "4.9-spiral-angles.png",
-        "4.9-spiral-angles.svg",
-        "A.7-line-trajectory.png",
-        "A.7-line-trajectory.svg",
-    }
+    figures = ("4.9-spiral-angles", "A.7-line-trajectory")
+    assert drawn == {f"{figure}.{kind}" for figure in figures for kind in ("png", "svg")}
     width, height = struct.unpack(">II", (tmp_path / "4.9-spiral-angles.png").read_bytes()[16:24])
     assert width >= 900
     assert height >= 600
@@ -75,12 +71,8 @@ def test_controllers_side_by_side(tmp_path: Path, ran: Ran) -> None:
     said = ran("compare", *contenders, "--track", "line", "--track", "spiral", "--out", tmp_path, code=1).out
     lines = (tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ",".join(map(identifier, COLUMNS))
-    assert [line.split(",")[:2] for line in lines[1:]] == [
-        ["thesis", "line"],
-        ["thesis", "spiral"],
-        ["thesis:global-lpv-mpc", "line"],
-        ["thesis:global-lpv-mpc", "spiral"],
-    ]
+    pairs = [[profile, track] for profile in ("thesis", "thesis:global-lpv-mpc") for track in ("line", "spiral")]
+    assert [line.split(",")[:2] for line in lines[1:]] == pairs
     assert [line.split(",")[2] for line in lines[1:3]] == ["0.05783", "0.1254"]
     assert float(lines[4].split(",")[2]) > 100.0
     table = (tmp_path / "compare.md").read_text(encoding="utf-8").splitlines()

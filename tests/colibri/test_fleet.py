@@ -62,14 +62,10 @@ def test_it_ends_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
 
 def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
+    command += ["--state", str(tmp_path / "state")]
     errors = tmp_path / "errors"
     with errors.open("wb") as said:
-        process = subprocess.Popen(
-            [*command, "--state", str(tmp_path / "state")],
-            stderr=said,
-            stdin=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        process = subprocess.Popen(command, stderr=said, stdin=subprocess.DEVNULL, start_new_session=True)
     started = psutil.Process(process.pid)
     wait_for(started.children, "its first process")
     children = started.children()

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tarfile
 import tomllib
+from functools import partial
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -98,23 +99,12 @@ def test_no_file_is_loaded_under_two_names() -> None:
 def test_what_is_installed_flies(kind: str, wheel: Path, sdist: Path, tmp_path: Path) -> None:
     what = {"wheel": (str(wheel),), "sdist": (str(sdist),), "editable": ("--editable", str(ROOT))}[kind]
     commands = environment(tmp_path / "environment", *what)
-    told = subprocess.run(
-        [commands / "python", "-c", "import colibri; print(colibri.__file__)"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    python = partial(subprocess.run, cwd=tmp_path, capture_output=True, text=True)
+    told = python([commands / "python", "-c", "import colibri; print(colibri.__file__)"], check=True).stdout
     assert told.startswith(str(ROOT if kind == "editable" else tmp_path))
     for link in ("memory", "udp"):
         flight = ["fly", "spiral", "--link", link, "--duration", "1", "--quiet", "--no-figures", "--out", str(tmp_path)]
         subprocess.run([commands / "colibri", *flight], cwd=tmp_path, check=True)
     (tmp_path / "test_first.py").write_text("def test_flight(sitl):\n    sitl.arm()\n    sitl.takeoff(1.0)\n")
-    done = subprocess.run(
-        [commands / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python([commands / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider"], check=False)
     assert "1 passed" in done.stdout, done.stdout + done.stderr

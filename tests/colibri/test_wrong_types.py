@@ -55,10 +55,9 @@ def test_a_wrong_type_is_refused_in_one_line(name: str, given: object) -> None:
 @pytest.mark.parametrize("option", OPTIONS)
 @pytest.mark.parametrize("given", [object(), [object()], np.full(2, np.nan), {"a": 1}, b"x", (5,), True])
 def test_an_option_of_a_wrong_type_is_refused_in_one_line(option: str, given: object) -> None:
-    with pytest.raises(colibri.Error, match=f"^{option}: ") as refused:
-        colibri.fly("hover", **{option: given})
-    assert "\n" not in str(refused.value)
-    assert "Literal" not in str(refused.value)
+    said = refusal_of(colibri.fly, "hover", **{option: given})
+    assert said.startswith(f"{option}: ")
+    assert "Literal" not in said
 
 
 @pytest.mark.parametrize("wind", [(5, 270), [5, 270], np.array([5.0, 270.0]), np.array([5, 270])])

@@ -25,11 +25,8 @@ LIMITS = [name for name in CASES if name not in ("pilot", "interrupted", "estima
 @pytest.fixture(scope="module")
 def endings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     folder, program = tmp_path_factory.mktemp("endings"), program_of("px4")
-    run(
-        [*ALONE, sys.executable, "-m", "tests.peers.endings", str(program), str(folder)],
-        check=True,
-        timeout=60 * MINUTES,
-    )
+    command = [*ALONE, sys.executable, "-m", "tests.peers.endings", str(program), str(folder)]
+    run(command, check=True, timeout=60 * MINUTES)
     found: dict[str, dict[str, Any]] = json.loads((folder / "endings.json").read_text(encoding="utf-8"))
     return found
 

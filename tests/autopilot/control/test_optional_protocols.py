@@ -145,10 +145,6 @@ def test_the_mass_estimate_continues_only_in_mid_flight() -> None:
 class Waiting(Counting):
     min_path_speed = 0.5
 
-    def initial(self, rotor_speed: float) -> Counted:
-        del rotor_speed
-        return Counted(0.0)
-
     def step_on_path(
         self, memory: Counted, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[Counted, Decision]:

@@ -96,9 +96,7 @@ def test_samples_have_each_object() -> None:
 
 @pytest.mark.parametrize("given", [{"logs": "lots"}, {"root_seed": "1"}, {"paired": 1}, {"grid": None}, {"grids": {}}])
 def test_keywords_are_as_strict_as_a_file(given: dict[str, Any]) -> None:
-    with pytest.raises(colibri.Error, match=next(iter(given))) as refused:
-        tables_of(CampaignTables, None, given)
-    assert "\n" not in str(refused.value)
+    assert next(iter(given)) in refusal_of(tables_of, CampaignTables, None, given)
 
 
 @pytest.mark.parametrize(("given", "seeds"), [("1-3", (1, 2, 3)), (7, (7,)), ("7", (7,)), ([4, 2], (4, 2))])

@@ -50,10 +50,8 @@ def test_a_thousand_episodes_have_the_same_bits() -> None:
         for size in (7, 64):
             assert _hashes(0, _EPISODES, size) == expected
         for size in (1, 7, 64):
-            assert [*pool.map(_hashes, (0, half), (half, _EPISODES), (size, size))] == [
-                expected[:half],
-                expected[half:],
-            ]
+            halves = [*pool.map(_hashes, (0, half), (half, _EPISODES), (size, size))]
+            assert halves == [expected[:half], expected[half:]]
 
 
 @pytest.mark.long

@@ -36,10 +36,7 @@ def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str
 
 @pytest.mark.parametrize("track", ["spiral", pytest.param("line", marks=pytest.mark.long)])
 def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: str) -> None:
-    flights = [
-        fly_thesis(tmp_path / "udp", track, "--link", "udp"),
-        fly_thesis(tmp_path / "memory", track, "--link", "memory"),
-    ]
+    flights = [fly_thesis(tmp_path / link, track, "--link", link) for link in ("udp", "memory")]
     assert len({figures["trajectory_sha256"] for figures in flights}) == 1
     flown = rows(tmp_path / "udp" / "flight.csv")
     assert max_difference(flown, reference(track), STATE) < 1e-4

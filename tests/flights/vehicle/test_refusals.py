@@ -13,7 +13,6 @@ from tests.support.flying import ACCEPTED, QUICK
 UPLOADS = [
     ("upload_mission", items.Item(mav.MAV_CMD_NAV_SPLINE_WAYPOINT, (), (1.0, 0.0, 4.0)), "mission item 1: NAV_SPLINE"),
     ("upload_mission", MissionItem(3, mav.MAV_CMD_NAV_WAYPOINT, 1, 0, 0, 0, 0, 0, 0, 5.0), "latitude 0, longitude 0"),
-    ("upload_mission", MissionItem(3, mav.MAV_CMD_NAV_WAYPOINT, 1, -2, 0, 0, 0, 1, 1, 5.0), "parameter 1 is -2"),
     ("upload_mission", items.jump(7, 1), "mission item 1: DO_JUMP (177): parameter 1 is 7"),
     ("upload_rally", items.waypoint(1.0, 0.0, 5.0), "rally item 1: NAV_WAYPOINT (16) is not supported"),
     ("upload_fence", items.circle(-3.0)[0], "parameter 1 is -3"),

@@ -247,10 +247,8 @@ def test_a_station_that_knows_only_the_old_messages() -> None:
         if seq == 0:
             assert asked(waiting) == [("MISSION_REQUEST", 1)]  # at once
     assert results(waiting) == [ACCEPTED]
-    assert [item[7:] for item in ground.service.plans[MISSION].items] == [
-        (475000000, -82500000, 20.0),
-        (475000000, -82500000, 21.0),
-    ]
+    places = [item[7:] for item in ground.service.plans[MISSION].items]
+    assert places == [(475000000, -82500000, 20.0), (475000000, -82500000, 21.0)]
 
 
 def test_old_requests_are_answered_with_degrees() -> None:

@@ -39,10 +39,8 @@ def data(log: ULog, topic: str) -> dict[str, Any]:
 
 
 def sample(time_us: int) -> dict[str, float]:
-    return {
-        **dict(zip(samples.COLUMNS, NUMBERS.uniform(0.0, 1.0, len(samples.COLUMNS)), strict=True)),
-        "time_us": time_us,
-    }
+    numbers = NUMBERS.uniform(0.0, 1.0, len(samples.COLUMNS))
+    return dict(zip(samples.COLUMNS, numbers, strict=True)) | {"time_us": time_us}
 
 
 class Appended(TopicLog):
@@ -74,12 +72,8 @@ def test_a_file_begins_with_facts_parameters_and_all_formats() -> None:
     log = read(b"")
     assert {"sys_name": "Colibri", "ver_hw": "Test"}.items() <= log.msg_info_dict.items()
     assert log.initial_parameters == {"AN_INT": 3, "A_FLOAT": 0.5}
-    assert log.message_formats.keys() == {
-        *topics.TOPICS,
-        *topics.PARTS,
-        *(topic.name for topic in FLIGHT_TOPICS),
-        INPUT,
-    }
+    formats = {*topics.TOPICS, *topics.PARTS, *(topic.name for topic in FLIGHT_TOPICS), INPUT}
+    assert log.message_formats.keys() == formats
     assert log.data_list == []
 
 
@@ -163,24 +157,15 @@ def test_sensors_and_their_estimate() -> None:
     axes = "accelerometer_m_s2[0] accelerometer_m_s2[1] accelerometer_m_s2[2] gyro_rad[0] gyro_rad[1] gyro_rad[2]"
     assert fields(measured, axes) == [1.0, -2.0, -3.0, 4.0, -5.0, -6.0]
     known = data(log, topics.ESTIMATOR)
-    assert fields(known, "timestamp solution_status_flags pos_horiz_accuracy pos_vert_accuracy") == [
-        7000,
-        831,
-        0.75,
-        1.5,
-    ]
+    names = "timestamp solution_status_flags pos_horiz_accuracy pos_vert_accuracy"
+    assert fields(known, names) == [7000, 831, 0.75, 1.5]
     ratios = fields(known, "vel_test_ratio pos_test_ratio hgt_test_ratio hdg_test_ratio hagl_test_ratio")
     assert ratios == single(0.1, 0.2, 0.3, 0.4, 0.5)
 
 
 def test_modes_have_px4s_numbers() -> None:
-    assert [nav_state(main << 16 | sub << 24) for main, sub in ((3, 0), (4, 3), (4, 4), (6, 0), (9, 9))] == [
-        2,
-        4,
-        3,
-        14,
-        31,
-    ]
+    numbers = [nav_state(main << 16 | sub << 24) for main, sub in ((3, 0), (4, 3), (4, 4), (6, 0), (9, 9))]
+    assert numbers == [2, 4, 3, 14, 31]
     status = VehicleStatus(
         armed=True, custom_mode=4 << 16 | 5 << 24, failsafe=True, armable=False, armed_us=5, takeoff_us=6
     )
@@ -214,13 +199,8 @@ def test_a_vehicle_of_ground_stations_is_recorded() -> None:
         (792_000, "WARNING", "low battery")
     ]
     assert data(log, topics.STATUS)["timestamp"].tolist() == [0, 1_000_000, 1_600_000]
-    assert fields(data(log, topics.BATTERY), "voltage_v current_a discharged_mah remaining warning") == [
-        11.5,
-        2,
-        500,
-        0.75,
-        1,
-    ]
+    battery = fields(data(log, topics.BATTERY), "voltage_v current_a discharged_mah remaining warning")
+    assert battery == [11.5, 2, 500, 0.75, 1]
     assert len(data(log, topics.POSITION)["x"]) == 60
     assert fields(data(log, topics.MPC), "iterations active_rates qp_status fallback", 59) == [7, 4, 0, -1]
 
@@ -255,8 +235,7 @@ def test_a_reader_resynchronises_at_the_next_block() -> None:
 
 def test_what_is_no_number_stays_none() -> None:
     row = dict.fromkeys(samples.COLUMNS, nan) | {"time_us": 8000}
-    row |= dict.fromkeys(("qp_status", "fallback"), -1) | {
-        f"active_{kind}": 0 for kind in ("rotors", "increments", "angles", "rates")
-    }
+    row |= dict.fromkeys(("qp_status", "fallback"), -1)
+    row |= dict.fromkeys(("active_rotors", "active_increments", "active_angles", "active_rates"), 0)
     found = data(read(encoded(samples.SampleBlocks(), list(row.values()))), topics.TRAJECTORY)
     assert all(isnan(found[name][0]) for name in ("position[0]", "yaw", "yawspeed"))

@@ -156,11 +156,8 @@ def test_text_and_mavlink_1_are_messages_too() -> None:
     text = codec.encode("STATUSTEXT", 6, b"hello")
     mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
     old = bytes(common.MAVLink_heartbeat_message(*HEARTBEAT).pack(mav, force_mavlink1=True))
-    assert [message.name for message in codec.decode(text + heartbeat() + old)] == [
-        "STATUSTEXT",
-        "HEARTBEAT",
-        "HEARTBEAT",
-    ]
+    names = [message.name for message in codec.decode(text + heartbeat() + old)]
+    assert names == ["STATUSTEXT", "HEARTBEAT", "HEARTBEAT"]
     assert not codec.dropped
 
 

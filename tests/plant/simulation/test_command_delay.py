@@ -37,19 +37,14 @@ def test_an_overtaken_command_is_never_followed() -> None:
     assert list(actuation.spans(0, 8)) == [(command(0.2), 8)]
 
 
+def hovering(latency_us: int) -> Plant:
+    world, physics = starting_world(Start(z=10.0, rotors=4740.0), VEHICLE), Physics(VEHICLE, "rk4")
+    options: dict[str, Any] = {"seed": 0, "interval_us": FRAME_US, "latency_us": latency_us}
+    return Plant(world, VEHICLE, physics, Feedback.STATE, DEFAULT_ORIGIN, **options)
+
+
 def flown(latency_us: int, frames: int) -> list[float]:
-    start = Start(z=10.0, rotors=4740.0)
-    physics = Physics(VEHICLE, "rk4")
-    plant = Plant(
-        starting_world(start, VEHICLE),
-        VEHICLE,
-        physics,
-        Feedback.STATE,
-        DEFAULT_ORIGIN,
-        seed=0,
-        interval_us=FRAME_US,
-        latency_us=latency_us,
-    )
+    plant = hovering(latency_us)
     speeds = []
     for _ in range(frames):
         speeds.append(plant.world.rotor_speeds[0])
@@ -64,11 +59,8 @@ def test_latency_shifts_what_happens() -> None:
 
 
 def test_a_plant_says_how_late_the_last_command_took_effect() -> None:
-    physics = Physics(VEHICLE, "rk4")
-    world = starting_world(Start(z=10.0, rotors=4740.0), VEHICLE)
-    options: dict[str, Any] = {"seed": 0, "interval_us": FRAME_US}
     for latency_us, said in ((0, [None, None, None]), (4_500, [None, None, 9_000])):
-        plant = Plant(world, VEHICLE, physics, Feedback.STATE, DEFAULT_ORIGIN, **options, latency_us=latency_us)
+        plant = hovering(latency_us)
         delays = []
         for _ in said:
             delays.append(plant.measure().plant_status.delay_us)
