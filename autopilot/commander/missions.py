@@ -205,10 +205,10 @@ class Missions:
         """Report bad items; `outside` names one outside the fence."""
         home, items, said = self._home, self.executor.items, {*self.unmet.values(), *self._remarks}
         found = self._found
-        copter = self._behaviour.copter_items
+        copter = self._behaviour.copter_items  # then a height of 0 keeps the height
         without = (*_ON_THE_GROUND, mav.MAV_CMD_NAV_TAKEOFF) if copter else _ON_THE_GROUND
         max_height_m = COPTERS_MAX_HEIGHT_M if copter else MAX_HEIGHT_M
-        flown = [each for each in found if items[each[0]].command not in without]
+        flown = [each for each in found if items[each[0]].command not in without and (items[each[0]].z or not copter)]
         reasons = {
             Need.WITHIN_REACH: _first(found, partial(too_far, max_height_m=max_height_m)),
             Need.INSIDE_FENCE: outside,

@@ -39,7 +39,7 @@ _TEXTS = {
             colibri view udpin:127.0.0.1:14550""",
         "plot cli.viewing": """draw the figures of a recorded flight
             colibri plot out/spiral""",
-        "export cli.viewing": """write the topics of a flight's ULog as MCAP, CSV or Parquet
+        "export cli.viewing": """write the topics of a flight's ULog as MCAP, CSV, Parquet or MATLAB
             colibri export out/spiral --mcap           # for Foxglove
             colibri export out/spiral --csv            # a table of each topic""",
         "replay flights.replay": """replay a recorded flight and compare the rotor commands

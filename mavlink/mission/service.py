@@ -217,7 +217,9 @@ class MissionService:
     def choose(self, seq: int, reset: bool = False) -> Refusal | None:
         """Go to an item, as clients count."""
         refusal = self._vehicle.set_current(max(seq - self._offset, 0) if self._offset else seq, reset)
-        if refusal is None and self._offset:
+        if refusal is not None and self._offset:
+            return refusal._replace(reason=f"mission: item {seq} is not within 0 to {len(self.plans[MISSION].items)}")
+        if self._offset:
             self._chosen = min(seq, self._offset)
         return refusal
 

@@ -31,6 +31,7 @@ MAX_SPEED_M_S = 50.0
 MAX_ACCELERATION_M_S2 = 50.0
 MAX_YAW_RATE_RAD_S = 35.0  # of body rates: 2000 degrees a second, the range of usual gyroscopes
 MAX_YAW_RAD = 1e3
+MAX_BELOW_M = 10.0  # of positions below the ground, which lead to a landing
 UNIT_WITHIN = 0.01  # tolerance of a quaternion's length: clients use single precision, some round
 
 _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6  # first bits of POSITION_TARGET_TYPEMASK
@@ -85,7 +86,7 @@ def decode_local(
     yaw_rad, yaw_rate_rad_s = _yaw(fields, here.yaw_rad if frame.turned_yaw else 0.5 * pi, up=frame.up)
     position = _position_from(place, frame, here)
     setpoint = PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us)
-    return _checked(setpoint, fields.type_mask)
+    return _checked(setpoint, fields.type_mask, here)
 
 
 def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
@@ -95,7 +96,7 @@ def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoi
     yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
     position = _position_of(fields, here)
     setpoint = PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, time_us=now_us)
-    return _checked(setpoint, fields.type_mask)
+    return _checked(setpoint, fields.type_mask, here)
 
 
 def decode_attitude(fields: Any, now_us: int) -> AttitudeSetpoint:
@@ -216,10 +217,13 @@ def _attitude(q: Any) -> Quaternion:
     return ned_frd_from_enu_flu((w / length, x / length, y / length, z / length))
 
 
-def _checked(setpoint: PositionSetpoint, mask: int) -> PositionSetpoint:
+def _checked(setpoint: PositionSetpoint, mask: int, here: Whereabouts) -> PositionSetpoint:
     position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, *_ = setpoint
     if all(map(isnan, (*position, *velocity, *acceleration, yaw_rad, yaw_rate_rad_s))):
         raise Refused("empty", f"type_mask {mask:#x}")
+    below_m = min(0.0, here.home.position_enu_m[2] if here.home else 0.0) - position[2]
+    if below_m > MAX_BELOW_M:
+        raise Refused("out of range", f"position {below_m:.0f} m below the ground")
     return setpoint
 
 

@@ -219,7 +219,12 @@ def landing(order: Land) -> TaskSequence:
 
 
 def homeward(context: TaskContext, place: Vector) -> TaskSequence:
-    """Climb if home or a rally point is far, fly there, land; of the fence only the height restricts a return."""
+    """Climb if home or a rally point is far, fly there, land; of the fence only the height restricts a return.
+
+    On the ground, stay there, as PX4 and ArduCopter do.
+    """
+    if context.standing:
+        return landing(Land())
     x, y, z = place
     behaviour, home_m = context.behaviour, context.home_enu_m[2]
     if behaviour.return_delay_s or behaviour.return_final_m or behaviour.return_cone:

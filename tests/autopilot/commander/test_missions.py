@@ -91,6 +91,13 @@ def test_an_item_below_the_ground_blocks_the_mission() -> None:
     assert Need.ABOVE_GROUND not in cockpit.missions.unmet, "as low as home"
 
 
+@pytest.mark.parametrize("copter", [True, False])
+def test_height_0_keeps_the_height_of_a_copter(copter: bool) -> None:
+    cockpit = Cockpit(FLYING, behaviour=Behaviour(copter_items=copter))
+    cockpit.load(MISSION, PLAN[0], item("NAV_WAYPOINT", place=(9.0, 0.0, 0.0)))
+    assert cockpit.said("along the ground") is not copter
+
+
 def test_the_home_fence_follows_home_and_parameters() -> None:
     cockpit = Cockpit()
     assert not cockpit.fence.exists

@@ -231,6 +231,16 @@ def test_a_return_lands_at_the_nearest_of_home_and_rally_points(
     assert highest < 20.0, "below the fence, though RTL_RETURN_ALT is 30 m"
 
 
+@pytest.mark.parametrize("behaviour", [Behaviour(), Behaviour(return_delay_s=5.0, return_cone=3.0)])
+def test_a_return_on_the_ground_stays_there(behaviour: Behaviour) -> None:
+    cockpit = Cockpit((30.0, 0.0, 0.0), behaviour=behaviour)
+    cockpit.home.move((0.0, 0.0, 0.0), 0.0)
+    assert cockpit.do("COMPONENT_ARM_DISARM", 1.0).result == ACCEPTED
+    assert cockpit.pilot.select(Mode.RETURN, {}) is None
+    cockpit.fly_for(5.0)
+    assert cockpit.state.position_enu_m == (30.0, 0.0, 0.0)
+
+
 def test_a_fence_of_this_frame_prevents_arming() -> None:
     cockpit = Cockpit((20.0, 0.0, 0.0))
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))

@@ -52,6 +52,7 @@ def index_validity(sitl: Sitl) -> None:
     upload(sitl, items.takeoff(5.0), items.waypoint(0.0, 5.0, 5.0), items.return_home())
     for seq, result in ((0, ACCEPTED), (1, ACCEPTED), (3, ACCEPTED), (-1, DENIED), (4, DENIED)):
         assert sitl.command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, float(seq)) == result, seq
+    assert sitl.said("item 4 is not within 0 to 3")
 
 
 def jump_tags(sitl: Sitl) -> None:

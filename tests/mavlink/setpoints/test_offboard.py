@@ -152,10 +152,10 @@ def test_half_of_a_body_group(offboard: Offboard) -> None:
     assert fixed.position_enu_m == approximately(*beside((0.0, 0.0), ahead, -7.0), nan)
 
 
-@pytest.mark.parametrize(("frame", "up"), [(0, -300.0), (5, -300.0), (3, 102.0), (6, 102.0), (10, 102.0), (11, 102.0)])
+@pytest.mark.parametrize(("frame", "up"), [(0, 50.0), (5, 50.0), (3, 452.0), (6, 452.0), (10, 452.0), (11, 452.0)])
 def test_global_frames(offboard: Offboard, frame: int, up: float) -> None:
     there = geodetic_of((100.0, -50.0, 0.0), ORIGIN)
-    wire = {"lat_int": round(there.latitude_deg * 1e7), "lon_int": round(there.longitude_deg * 1e7), "alt": 100.0}
+    wire = {"lat_int": round(there.latitude_deg * 1e7), "lon_int": round(there.longitude_deg * 1e7), "alt": 450.0}
     setpoint = taken(offboard, GLOBAL, coordinate_frame=frame, type_mask=0x9F8, **wire, yaw=0.3)
     assert isinstance(setpoint, PositionSetpoint)
     assert setpoint.position_enu_m == pytest.approx((100.0, -50.0, up), abs=0.02)
@@ -170,7 +170,7 @@ def test_global_frames(offboard: Offboard, frame: int, up: float) -> None:
 
 def test_without_home_nothing_is_relative_to_it(offboard: Offboard) -> None:
     offboard.update(PLACE, HEADING, ORIGIN, None)
-    wire = {"lat_int": 470000000, "lon_int": 80000000, "alt": 10.0, "type_mask": 0x9F8}
+    wire = {"lat_int": 470000000, "lon_int": 80000000, "alt": 410.0, "type_mask": 0x9F8}
     assert taken(offboard, GLOBAL, coordinate_frame=6, **wire) is None
     assert offboard.dropped == {"no home": 1}
     assert taken(offboard, GLOBAL, coordinate_frame=5, **wire) is not None
@@ -238,6 +238,7 @@ def test_nan_masks_axes_as_in_px4(offboard: Offboard, fields: dict[str, float], 
         (LOCAL, {"coordinate_frame": 1, "type_mask": VELOCITY, "vx": 40.0, "vy": -40.0}, "out of range"),
         (LOCAL, {"coordinate_frame": 8, "type_mask": ACCELERATION, "afz": 51.0}, "out of range"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": POSITION, "z": -1.1e6}, "out of range"),
+        (LOCAL, {"coordinate_frame": 1, "type_mask": POSITION, "z": 11.0}, "out of range"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": YAW, "yaw": 1e30}, "out of range"),
         (LOCAL, {"coordinate_frame": 1, "type_mask": RATE, "yaw_rate": -100.0}, "out of range"),
         (GLOBAL, {"coordinate_frame": 5, "type_mask": POSITION, "lat_int": 2**31 - 1}, "out of range"),
