@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from msgspec.structs import replace
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
@@ -172,7 +173,7 @@ def identified(companion: Companion) -> tuple[Response, str, Fit]:
     commanded, measured = (np.reshape(rows, (-1, 4)) for rows in (steps.commanded, steps.measured))
     found = fit(RateLog(commanded[:, 0], commanded[:, 1:], measured[:, 0], measured[:, 1:]))
     p, q, r = found.time_constant_s.tolist()
-    response = stack.response._replace(time_constant_s=(p, q, r), latency_s=found.latency_s)
+    response = replace(stack.response, time_constant_s=(p, q, r), latency_s=found.latency_s)
     if found.order > 1:
         response = _of_second_order(response, found)
     explained = ", ".join(f"{100.0 * part:.0f}" for part in found.explained)
@@ -191,4 +192,4 @@ def _of_second_order(response: Response, found: Fit) -> Response:
         max(assumed, rate / lag_s) if behind_s > 0.0 else assumed
         for assumed, rate, lag_s, behind_s in zip(*largest, (p, q, r), strict=True)
     )
-    return response._replace(acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))
+    return replace(response, acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))

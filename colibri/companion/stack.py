@@ -16,7 +16,6 @@ import msgspec
 from colibri.common.config import UNREADABLE, NotNegative, Positive, Table
 from colibri.common.errors import Error
 from colibri.common.files import read_text
-from colibri.common.types import Vector
 from colibri.mavlink.client.modes import COPTER_MODES, PX4_MODES, FlightMode
 from colibri.mavlink.services.identity import PRODUCT
 from colibri.mavlink.wire.dialect import AUTOPILOT_GENERIC, mav
@@ -98,15 +97,26 @@ class ParameterRule(NamedTuple):
     action: str
 
 
-class Response(NamedTuple):
+TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
+Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]
+Lag: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
+Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
+
+
+class Response(Table, frozen=True, forbid_unknown_fields=True):
     """Response of body rates and thrust; a time constant too long costs stability, one too short only bandwidth."""
 
-    time_constant_s: Vector  # the rate loop demands the acceleration (command - rate) / time constant
-    latency_s: float  # from a command's arrival to its first effect
-    thrust_lag_s: float
-    max_rate_rad_s: Vector  # limit in the stack
-    max_acceleration_rad_s2: Vector  # limit in the stack
-    acceleration_lag_s: Vector = (0.0, 0.0, 0.0)  # 0 for first order
+    # the rate loop demands the acceleration (command - rate) / time constant
+    time_constant_s: tuple[TimeConstant, TimeConstant, TimeConstant]
+    latency_s: Latency  # from a command's arrival to its first effect
+    thrust_lag_s: NotNegative
+    max_rate_rad_s: tuple[Positive, Positive, Positive]  # limit in the stack
+    max_acceleration_rad_s2: tuple[Positive, Positive, Positive]  # limit in the stack
+    acceleration_lag_s: tuple[Lag, Lag, Lag] = (0.0, 0.0, 0.0)  # 0 for first order
+
+
+class ResponseFile(Response, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    thrust_scale: Scale = 1.0  # actual thrust over the thrust derived from the vehicle's parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -231,23 +241,6 @@ def recognised(autopilot: int, uid2: bytes) -> Stack | None:
     return _BY_AUTOPILOT.get(autopilot)
 
 
-TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
-Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]
-Lag: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
-Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
-
-
-class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    time_constant_s: tuple[TimeConstant, TimeConstant, TimeConstant]
-    latency_s: Latency
-    thrust_lag_s: NotNegative
-    max_rate_rad_s: tuple[Positive, Positive, Positive]
-    max_acceleration_rad_s2: tuple[Positive, Positive, Positive]
-    acceleration_lag_s: tuple[Lag, Lag, Lag] = (0.0, 0.0, 0.0)
-    thrust_scale: Scale = 1.0
-    """Actual thrust over the thrust derived from the vehicle's parameters."""
-
-
 def read_response(path: Path) -> tuple[Response, float]:
     try:
         text = read_text(path)
@@ -256,13 +249,13 @@ def read_response(path: Path) -> tuple[Response, float]:
         raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error
     except UNREADABLE as error:
         raise CompanionError(f"{path}: {error}") from error
-    response = Response(*(getattr(found, name) for name in Response._fields))
+    response = Response(*(getattr(found, name) for name in Response.__struct_fields__))
     return response, found.thrust_scale
 
 
 def response_text(response: Response, thrust_scale: float, remarks: list[str]) -> str:
     lines = [f"# {remark}" for remark in remarks]
-    for name, value in (response._asdict() | {"thrust_scale": thrust_scale}).items():
+    for name, value in (msgspec.structs.asdict(response) | {"thrust_scale": thrust_scale}).items():
         values = [f"{part:.4g}" for part in value] if isinstance(value, tuple) else None
         lines.append(f"{name} = [{', '.join(values)}]" if values else f"{name} = {float(value):.4g}")
     return "\n".join(lines) + "\n"

@@ -12,7 +12,8 @@ from colibri.mavlink.client.commands import Command, set_message_interval
 from colibri.mavlink.client.conversation import Repeat
 from colibri.mavlink.client.parameters import ReadParameter
 from colibri.mavlink.client.report import VehicleReport
-from colibri.mavlink.client.states import HANDLES, StateAssembler, TimedState
+from colibri.mavlink.client.states import HANDLES, StateAssembler
+from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Message, mav
 
 OWN_SYSTEM, OWN_COMPONENT = 1, mav.MAV_COMP_ID_ONBOARD_COMPUTER
@@ -32,7 +33,7 @@ class ReceivedState(NamedTuple):
     """A state and its time on the companion's clock."""
 
     at_us: int
-    state: TimedState
+    state: StateFrame
 
 
 class LocalOrigin(NamedTuple):
@@ -153,7 +154,7 @@ class VehiclePeer:
             self._arrivals_us.popleft()
         if not self.clock.known:
             return None
-        at_us = min(self.clock.own_us(state.vehicle_us), now_us)
+        at_us = min(self.clock.own_us(state.time_us), now_us)
         self._delays_us.append(now_us - at_us)
         return ReceivedState(at_us, state)
 

@@ -112,7 +112,6 @@ class InMemory:
         self,
         frame_interval_us: int,
         feedback: Feedback,
-        system_id: int = SYSTEM_ID,
         traffic: Traffic | None = None,
         *,
         replayed: bool = True,
@@ -121,10 +120,10 @@ class InMemory:
         self._traffic = traffic
         self._replayed = replayed
         self.plant_end = PlantEnd(
-            system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
+            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
         )
         self.autopilot_end = AutopilotEnd(
-            system_id=system_id, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
+            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
         )
         self.autopilot_end.poll(NEVER_LATE_S)
         self._to_plant(0)

@@ -1,10 +1,11 @@
-"""The vehicle's state from ODOMETRY, or from messages of attitude and position."""
+"""The vehicle's own estimate, in its frame and by its clock, from ODOMETRY, or messages of attitude and position."""
 
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
@@ -16,16 +17,6 @@ _EARTH: int = mav.MAV_FRAME_LOCAL_NED
 HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})
 
 
-class TimedState(NamedTuple):
-    """The vehicle's own estimate, in its local frame."""
-
-    vehicle_us: int  # by the vehicle's clock
-    position_enu_m: Vector
-    velocity_enu_m_s: Vector
-    attitude: Quaternion  # FLU to ENU
-    rate_flu_rad_s: Vector
-
-
 class StateAssembler:
     def __init__(self) -> None:
         self._last_us = -1
@@ -34,7 +25,7 @@ class StateAssembler:
         self._quaternion_us: int | None = None
         self.refused = 0  # states with non-finite values
 
-    def receive(self, message: Message, now_us: int) -> TimedState | None:
+    def receive(self, message: Message, now_us: int) -> StateFrame | None:
         name, fields = message.name, message.fields
         if name == "ODOMETRY":
             state = _of_odometry(fields)
@@ -52,12 +43,12 @@ class StateAssembler:
         if not all(map(isfinite, (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state[4]))):
             self.refused += 1
             return None
-        if state.vehicle_us <= self._last_us and self._last_us - state.vehicle_us < _ODOMETRY_STAYS_US:
+        if state.time_us <= self._last_us and self._last_us - state.time_us < _ODOMETRY_STAYS_US:
             return None
-        self._last_us = state.vehicle_us
+        self._last_us = state.time_us
         return state
 
-    def _of_attitude(self, name: str, fields: Any, now_us: int) -> TimedState | None:
+    def _of_attitude(self, name: str, fields: Any, now_us: int) -> StateFrame | None:
         if name == "ATTITUDE_QUATERNION":
             self._quaternion_us = now_us
             ned_frd: Quaternion = (fields.q1, fields.q2, fields.q3, fields.q4)
@@ -73,10 +64,10 @@ class StateAssembler:
         by_s = (at_us - place_us) * 1e-6
         vx, vy, vz = velocity
         place = (x + by_s * vx, y + by_s * vy, z + by_s * vz)
-        return TimedState(at_us, place, velocity, _unit(ned_frd_from_enu_flu(ned_frd)), rate)
+        return StateFrame(at_us, place, velocity, _unit(ned_frd_from_enu_flu(ned_frd)), rate)
 
 
-def _of_odometry(fields: Any) -> TimedState | None:
+def _of_odometry(fields: Any) -> StateFrame | None:
     if fields.frame_id != _EARTH:
         return None
     attitude = _unit(ned_frd_from_enu_flu(tuple(fields.q)))
@@ -84,7 +75,7 @@ def _of_odometry(fields: Any) -> TimedState | None:
     by_earth = fields.child_frame_id == _EARTH
     velocity = ned_from_enu(wire) if by_earth else earth_from_body(attitude, frd_from_flu(wire))
     rate = frd_from_flu((fields.rollspeed, fields.pitchspeed, fields.yawspeed))
-    return TimedState(fields.time_usec, ned_from_enu((fields.x, fields.y, fields.z)), velocity, attitude, rate)
+    return StateFrame(fields.time_usec, ned_from_enu((fields.x, fields.y, fields.z)), velocity, attitude, rate)
 
 
 def _unit(q: Quaternion) -> Quaternion:

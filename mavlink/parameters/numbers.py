@@ -31,21 +31,10 @@ class Number(NamedTuple):
 
     def parameter(self, default: Value, group: str = "", details: str = "", wire: int = 0) -> Parameter:
         """Return the parameter; its bounds widen to include the default."""
-        return Parameter(
-            name=self.name,
-            kind=ParamType.REAL if isinstance(default, float) else ParamType.INT,
-            default=default,
-            minimum=min(self.minimum, default),
-            maximum=max(self.maximum, default),
-            unit=self.unit,
-            decimals=self.decimals,
-            description=self.description,
-            details=details or self.details,
-            group=group or self.group,
-            values=self.values,
-            read_only=self.read_only,
-            wire=wire,
-        )
+        same = {field: value for field, value in self._asdict().items() if field not in ("path", "scale", "kind")}
+        same |= {"minimum": min(self.minimum, default), "maximum": max(self.maximum, default), "default": default}
+        same |= {"details": details or self.details, "group": group or self.group}
+        return Parameter(**same, kind=ParamType.REAL if isinstance(default, float) else ParamType.INT, wire=wire)
 
 
 def _number(text: str) -> Value:

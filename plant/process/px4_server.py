@@ -36,7 +36,7 @@ def run(spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> int:
         simulator = Simulator(spec, link, status, stop)
     except Error as error:
         fail(str(error))
-    with closing(link, simulator):
+    with closing(link, simulator.logs):
         simulator.serve()
     return stop.code
 
@@ -62,7 +62,7 @@ class Simulator:
         self._seed, self._speed, self._duration_us = spec.seed, spec.pace, spec.duration * 1e6
         self._link, self._status, self._stop = link, status, stop
         self._end = SimulatorEnd(system_id=spec.system_id, rotors=vehicle.rotors.count)
-        self._logs = PlantLogs(spec.out, vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
+        self.logs = PlantLogs(spec.out, vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
         self._logged_calls = 1
         self._time_us = 0
 
@@ -76,10 +76,6 @@ class Simulator:
             if self._end.peer is not None:
                 self._status.say("connected", "PX4 has called")
                 over = self._fly()
-
-    def close(self) -> None:
-        if self._logs:
-            self._logs.close()
 
     def _fly(self) -> bool:
         began_s, call = perf_counter(), self._end.calls
@@ -104,8 +100,8 @@ class Simulator:
         if gone:
             text += f"; {awaiting('PX4', self._link)}"
         self._log_received()
-        if self._logs:
-            self._logs.flush()
+        if self.logs:
+            self.logs.flush()
         report_end(self._status, world.time_us, began_s, text, event=event, **figures)
         return not gone
 
@@ -121,8 +117,8 @@ class Simulator:
         self._log_received()
         self._time_us = world.time_us
         self._log_sent(sent)
-        if self._logs:
-            self._logs.write_world(world)
+        if self.logs:
+            self.logs.write_world(world)
 
     def _truth(self, world: World) -> Truth:
         state = state_frame(world)
@@ -166,17 +162,17 @@ class Simulator:
         return [frames for frames, _ in outbox]
 
     def _log_sent(self, sent: list[tuple[bytes, ...]]) -> None:
-        if self._logs and sent:
+        if self.logs and sent:
             self._log_received()
             for frames in sent:
-                self._logs.write_frames(self._time_us, list(frames))
+                self.logs.write_frames(self._time_us, list(frames))
 
     def _log_received(self) -> None:
-        if self._logs and self._end.calls > self._logged_calls:
-            self._logs.begin_again()
+        if self.logs and self._end.calls > self._logged_calls:
+            self.logs.begin_again()
             self._logged_calls, self._time_us = self._end.calls, 0
-        if self._logs:
-            self._logs.write_frames(self._time_us, self._end.received)
+        if self.logs:
+            self.logs.write_frames(self._time_us, self._end.received)
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
@@ -28,10 +28,6 @@ MAX_WAIT_S = 0.1  # between two checks whether the process shall end
 SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
 
 
-class Closable(Protocol):
-    def close(self) -> None: ...
-
-
 def awaiting(whom: str, link: GroundLink) -> str:
     return f"waiting for {whom} on {link.url}" if link.target is None else f"connecting to {whom} at {link.url}"
 
@@ -41,7 +37,7 @@ def all_parameters_by(vehicle: str, whom: str) -> str:
 
 
 @contextmanager
-def closing(*opened: Closable | None, out: Path | None = None) -> Iterator[None]:
+def closing(*opened: "GroundLink | PlantLogs | None", out: Path | None = None) -> Iterator[None]:
     """Fly without garbage collection, then close `opened`; an error ends the process with one line."""
     try:
         with gc_frozen():

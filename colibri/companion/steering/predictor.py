@@ -17,7 +17,7 @@ from colibri.common.jit import Packed, compiled, packed
 from colibri.common.kernels import exp
 from colibri.common.types import Array, Vector
 from colibri.companion.stack import Response
-from colibri.mavlink.client.states import TimedState
+from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
 STATES, COMMANDS = 17, 4
@@ -233,7 +233,7 @@ class Predictor:
         while len(self._sent) > 1 and self._sent[1].acts_us < acts_us - _KEPT_US:
             self._sent.popleft()
 
-    def observe(self, at_us: int, state: TimedState) -> None:
+    def observe(self, at_us: int, state: StateFrame) -> None:
         """Use a state; one out of order is dropped."""
         if self._known is not None and at_us <= self._known[0]:
             return

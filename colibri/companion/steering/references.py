@@ -15,7 +15,7 @@ import numpy as np
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.autopilot.guidance.trajectories.tracks import Hover, Track
 from colibri.common.types import Vector
-from colibri.mavlink.client.states import TimedState
+from colibri.mavlink.hil.state import StateFrame
 
 OVER_S = 4.0
 _SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)  # coefficients of u^5 to u^9, over u = 0..1
@@ -169,6 +169,6 @@ class StepFlight:
         self.commanded.append((arrives_us * 1e-6, p, q, r))
         return p, q, r
 
-    def add(self, at_us: int, state: TimedState) -> None:
+    def add(self, at_us: int, state: StateFrame) -> None:
         if self._began_us is not None:
             self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))

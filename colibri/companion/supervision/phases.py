@@ -10,7 +10,7 @@ from colibri.common.rotations import normalized, quaternion_product
 from colibri.common.types import Quaternion, Vector
 from colibri.companion.supervision.rules import FlightFacts, Rule
 from colibri.companion.vehicle_peer import ReceivedState
-from colibri.mavlink.client.states import TimedState
+from colibri.mavlink.hil.state import StateFrame
 
 
 class CompanionPhase(StrEnum):
@@ -131,7 +131,7 @@ class Consistency:
         self._moved: Vector = (0.0, 0.0, 0.0)
         self._windows = 0
 
-    def add(self, at_us: int, state: TimedState) -> None:
+    def add(self, at_us: int, state: StateFrame) -> None:
         now, last = ReceivedState(at_us, state), self._last
         self._last = now
         passed_s = 0.0 if last is None else (at_us - last.at_us) * 1e-6
@@ -153,7 +153,7 @@ class Consistency:
     def _begin(self, now: ReceivedState) -> None:
         self._start, self._turned, self._moved = now, now.state.attitude, now.state.position_enu_m
 
-    def _judge(self, state: TimedState) -> None:
+    def _judge(self, state: StateFrame) -> None:
         cosine = abs(sum(a * b for a, b in zip(self._turned, state.attitude, strict=True)))
         turn_rad, way_m = 2.0 * acos(min(cosine, 1.0)), dist(self._moved, state.position_enu_m)
         found = ""

@@ -18,7 +18,7 @@ from colibri.companion.steering.references import Stay, stay_of
 from colibri.companion.supervision.phases import CompanionPhase, Consistency, PhaseCondition, how_it_ended
 from colibri.companion.supervision.rules import LIMITS
 from colibri.companion.vehicle_peer import VehiclePeer
-from colibri.mavlink.client.states import TimedState
+from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, mav
 from tests.colibri.companion.in_memory import Ride
 from tests.colibri.companion.stand_in import PX4_HOLD, REJECTED, Px4, StandIn
@@ -150,7 +150,7 @@ def test_stale_values_contradict_the_others(stale: str) -> None:
         turned = 0.0 if stale == "attitude" else 1.5 * moving
         x = 0.0 if stale == "position" else 2.0 * moving
         attitude = (cos(0.5 * turned), sin(0.5 * turned), 0.0, 0.0)
-        states.add(round(1e6 * t), TimedState(0, (x, 0.0, 0.0), (v, 0.0, 0.0), attitude, (p, 0.0, 0.0)))
+        states.add(round(1e6 * t), StateFrame(0, (x, 0.0, 0.0), (v, 0.0, 0.0), attitude, (p, 0.0, 0.0)))
         if states.contradiction and since_s is None:
             since_s = t - 0.5
     assert (since_s is not None) is (stale != "")

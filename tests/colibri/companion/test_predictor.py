@@ -1,23 +1,24 @@
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from scipy.linalg import expm
 
 from colibri.common.jit import packed
 from colibri.companion.stack import Response
 from colibri.companion.steering import predictor as model
 from colibri.companion.steering.predictor import Predictor
-from colibri.mavlink.client.states import TimedState
+from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird").without(["drag"])
 FIRST = Response((0.03, 0.05, 0.2), 0.01, 0.0, (9.0, 9.0, 9.0), (999.0, 999.0, 999.0))
-SECOND = FIRST._replace(time_constant_s=(0.07, 0.05, 0.3), acceleration_lag_s=(0.04, 0.03, 0.1))
+SECOND = replace(FIRST, time_constant_s=(0.07, 0.05, 0.3), acceleration_lag_s=(0.04, 0.03, 0.1))
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 STILL = (0.0, 0.0, 0.0)
 
 
-def hovering(at_us: int, x: float, vx: float, rate: tuple[float, float, float] = STILL) -> TimedState:
-    return TimedState(at_us, (x, 0.0, 2.0), (vx, 0.0, 0.0), LEVEL, rate)
+def hovering(at_us: int, x: float, vx: float, rate: tuple[float, float, float] = STILL) -> StateFrame:
+    return StateFrame(at_us, (x, 0.0, 2.0), (vx, 0.0, 0.0), LEVEL, rate)
 
 
 def test_position_and_velocity_are_predicted_consistently() -> None:

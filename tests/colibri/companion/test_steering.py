@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import position
@@ -132,7 +133,7 @@ def test_a_track_begins_at_rest_and_goes_on_as_it_is(name: str) -> None:
 
 
 def test_a_slower_attitude_loop_becomes_inertia() -> None:
-    slow = PX4.response._replace(max_acceleration_rad_s2=(10.0, 12.0, 6.0))
+    slow = replace(PX4.response, max_acceleration_rad_s2=(10.0, 12.0, 6.0))
     ix, iy, iz = turning_no_faster(load_vehicle("iris"), slow).body.inertia_kg_m2
     before = load_vehicle("iris").body.inertia_kg_m2
     assert min(ix / before[0], iy / before[1]) > 1.0

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.client.clock import VehicleClock
 from colibri.mavlink.client.report import VehicleReport
-from colibri.mavlink.client.states import StateAssembler, TimedState
+from colibri.mavlink.client.states import StateAssembler
+from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, Message
 
 VEHICLE = Codec(1, 1)
@@ -99,8 +100,8 @@ def test_a_state_is_in_enu_and_flu_by_any_messages() -> None:
     euler.receive(said("LOCAL_POSITION_NED", 20, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), 0)
     angles = euler.receive(said("ATTITUDE", 20, 0.0, 0.0, 0.0, *rate), 0)
     for state in (odometry, quaternion, angles):
-        assert isinstance(state, TimedState)
-        assert state.vehicle_us == 20_000
+        assert isinstance(state, StateFrame)
+        assert state.time_us == 20_000
         assert state.position_enu_m == pytest.approx((2.0, 1.0, 3.0))
         assert state.velocity_enu_m_s == pytest.approx((0.0, 0.5, 0.0))
         assert state.rate_flu_rad_s == pytest.approx((0.1, -0.2, -0.3))
@@ -110,7 +111,7 @@ def test_a_state_is_in_enu_and_flu_by_any_messages() -> None:
 def test_a_state_is_neither_old_nor_without_number() -> None:
     states, nan, q = StateAssembler(), float("nan"), (1.0, 0.0, 0.0, 0.0)
 
-    def odometry(time_us: int, x: float, frame: int = 1) -> TimedState | None:
+    def odometry(time_us: int, x: float, frame: int = 1) -> StateFrame | None:
         rest = (0.0,) * 6
         fields = (time_us, frame, 12, x, 0.0, 0.0, q, *rest, NO_COVARIANCE, NO_COVARIANCE, 0, 8, 9)
         return states.receive(said("ODOMETRY", *fields), 0)
