@@ -1,16 +1,15 @@
 """Prediction step of the filter: Solà's sections 5.3 and 5.4, with the attitude error in the body frame."""
 
 from math import sqrt
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.compiled_rotations import quaternion_product, rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, exp, sin
 from colibri.common.matrices import put
-from colibri.common.types import Array, Quaternion, Vector
-
-Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+from colibri.common.types import Array, Matrix, Quaternion, Vector
 
 # First index of each part of the error state: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS, GPS_DRIFT, BARO_OFFSET, HARD_IRON = 0, 3, 6, 9, 12, 15, 18, 19
@@ -51,7 +50,7 @@ class Noise(NamedTuple):
 
 
 @compiled
-def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Vector, Vector]:
+def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Matrix, Vector, Vector]:
     """Advance the nominal state by one sample, Solà's (260).
 
     Return the rotation at mid-interval by rows, specific force without bias, and the angle turned, rad, FLU.
@@ -63,8 +62,8 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
         b = (samples[row, RATE + 1] - x[11]) * dt
         c = (samples[row, RATE + 2] - x[12]) * dt
     q = (x[6], x[7], x[8], x[9])
-    R = _matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
-    fx, fy, fz = R[6] * gravity, R[7] * gravity, R[8] * gravity
+    R = rotation_matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
+    fx, fy, fz = R[2][0] * gravity, R[2][1] * gravity, R[2][2] * gravity
     if samples[row, BLIND_FORCE] == MODELLED:
         fx, fy, fz = 0.0, 0.0, samples[row, THRUST]
         M = _drag_matrix(R, samples, row)
@@ -74,9 +73,9 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
         fx = samples[row, FORCE] - x[13]
         fy = samples[row, FORCE + 1] - x[14]
         fz = samples[row, FORCE + 2] - x[15]
-    dvx = (R[0] * fx + R[1] * fy + R[2] * fz) * dt
-    dvy = (R[3] * fx + R[4] * fy + R[5] * fz) * dt
-    dvz = (R[6] * fx + R[7] * fy + R[8] * fz - gravity) * dt
+    dvx = (R[0][0] * fx + R[0][1] * fy + R[0][2] * fz) * dt
+    dvy = (R[1][0] * fx + R[1][1] * fy + R[1][2] * fz) * dt
+    dvz = (R[2][0] * fx + R[2][1] * fy + R[2][2] * fz - gravity) * dt
     x[0] += (x[3] + 0.5 * dvx) * dt
     x[1] += (x[4] + 0.5 * dvy) * dt
     x[2] += (x[5] + 0.5 * dvz) * dt
@@ -90,13 +89,13 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 
 
 @compiled
-def _drag_matrix(R: Nine, samples: Array, row: int) -> Array:
+def _drag_matrix(R: Matrix, samples: Array, row: int) -> Array:
     """Return the effect of the bias of a modelled force, ENU: horizontal drag in level hover, and vertical force."""
     across, along = samples[row, ACROSS], samples[row, ALONG]
     M = np.zeros((3, 3))
     for j in range(2):
         for i in range(3):
-            M[i, j] = (along - across) * R[3 * i + 2] * R[3 * j + 2]
+            M[i, j] = (along - across) * R[i][2] * R[j][2]
         M[j, j] += across
     M[2, 2] = 1.0
     return M
@@ -114,14 +113,14 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
     if sees_force:
         fx, fy, fz = force[0] * dt, force[1] * dt, force[2] * dt
         for i in range(3):
-            a, b, c = R[3 * i], R[3 * i + 1], R[3 * i + 2]
+            a, b, c = R[i]
             push[i, 0], push[i, 1], push[i, 2] = c * fy - b * fz, a * fz - c * fx, b * fx - a * fy
             lever[i, 0], lever[i, 1], lever[i, 2] = a * dt, b * dt, c * dt
     if samples[row, BLIND_FORCE] == MODELLED:
         put(_drag_matrix(R, samples, row) * dt, lever)
-    unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -0.5 * turn[0], -0.5 * turn[1], -0.5 * turn[2]))
-    for i in range(9):
-        back[i // 3, i % 3] = unturned[i]
+    unturned = rotation_matrix(_turned((1.0, 0.0, 0.0, 0.0), -0.5 * turn[0], -0.5 * turn[1], -0.5 * turn[2]))
+    for i in range(3):
+        back[i, 0], back[i, 1], back[i, 2] = unturned[i]
     half_s = 0.5 * dt if sees_rate else 0.0
     _carry(P, push, lever, back, half_s, decay, dt)
     _carry(P.T, push, lever, back, half_s, decay, dt)
@@ -162,7 +161,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
         if row == len(samples):
             row = 0
     put(ahead, now[:10])
-    R = _matrix((x[6], x[7], x[8], x[9]))
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
     for i in range(3):
         p, v = POSITION + i, VELOCITY + i
         now[10 + i] = sqrt(P[p, p] + delay * (2.0 * P[p, v] + delay * P[v, v]))
@@ -170,7 +169,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
         variance = 0.0
         for j in range(3):
             for k in range(3):
-                variance += R[3 * i + j] * P[ATTITUDE + j, ATTITUDE + k] * R[3 * i + k]
+                variance += R[i][j] * P[ATTITUDE + j, ATTITUDE + k] * R[i][k]
         now[16 + i] = sqrt(variance)
 
 
@@ -215,27 +214,4 @@ def _turned(q: Quaternion, x: float, y: float, z: float) -> Quaternion:
     else:
         half = sqrt(square)
         c, s = cos(half), 0.5 * sin(half) / half
-    x, y, z = s * x, s * y, s * z
-    w, i, j, k = q
-    return (
-        w * c - i * x - j * y - k * z,
-        w * x + i * c + j * z - k * y,
-        w * y - i * z + j * c + k * x,
-        w * z + i * y - j * x + k * c,
-    )
-
-
-@compiled
-def _matrix(q: Quaternion) -> Nine:
-    w, x, y, z = q
-    return (
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y - w * z),
-        2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z),
-        1.0 - 2.0 * (x * x + z * z),
-        2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
-    )
+    return quaternion_product(q, (c, s * x, s * y, s * z))

@@ -18,6 +18,7 @@ from colibri.autopilot.estimation.eskf_predict import (
     POSITION,
     VELOCITY,
 )
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import compiled
 from colibri.common.kernels import asin
 from colibri.common.types import Array
@@ -237,12 +238,9 @@ def _inject(x: Array, P: Array, error: Array) -> None:
 
 @compiled
 def _in_body(x: Array, earth: Array) -> Array:
-    w, a, b, c = x[6:10]
-    e, n, u = earth
-    body = np.empty(3)
-    body[0] = (1.0 - 2.0 * (b * b + c * c)) * e + 2.0 * (a * b + w * c) * n + 2.0 * (a * c - w * b) * u
-    body[1] = 2.0 * (a * b - w * c) * e + (1.0 - 2.0 * (a * a + c * c)) * n + 2.0 * (b * c + w * a) * u
-    body[2] = 2.0 * (a * c + w * b) * e + 2.0 * (b * c - w * a) * n + (1.0 - 2.0 * (a * a + b * b)) * u
+    R, body = rotation_matrix((x[6], x[7], x[8], x[9])), np.empty(3)
+    for i in range(3):
+        body[i] = R[0][i] * earth[0] + R[1][i] * earth[1] + R[2][i] * earth[2]
     return body
 
 
