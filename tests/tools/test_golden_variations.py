@@ -6,9 +6,9 @@ import pytest
 
 from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
+from tests.support.recorded import begins_as_recorded
 from tools.golden import GoldenHashes, Variation, fly, variations
 from tools.golden import main as golden_main
-from tools.harness.processes import begins_as_recorded
 
 FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mpc", "crown", "tumbling-by-se3")
 """Those that showed a difference of kernels first, and others of other parts."""

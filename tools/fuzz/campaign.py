@@ -32,15 +32,11 @@ class FuzzingRelay(Relay):
             "plant": Fuzzer(self._chance, AUTOPILOT, PLANT),
             "autopilot": Fuzzer(self._chance, PLANT, AUTOPILOT),
         }
-        self._twins = {"plant": Codec(*PLANT), "autopilot": Codec(*AUTOPILOT)}
+        self.twins = {"plant": Codec(*PLANT), "autopilot": Codec(*AUTOPILOT)}
         self._burst = burst
         self._quota = quota
         self._moments_us = dict.fromkeys(self._fuzzers, 0)
         self.sent = {(to, kind): 0 for to in self._fuzzers for kind in ("random", "hostile")}
-
-    def unreadable(self, to: str) -> dict[str, int]:
-        """Return the counts of the codec of `to` if every datagram arrived."""
-        return unreadable(self._twins[to].dropped)
 
     def pass_on(self, to: str, datagram: bytes) -> None:
         moment_us = _moment_us(datagram)
@@ -60,11 +56,11 @@ class FuzzingRelay(Relay):
             if self.sent[to, kind] < self._quota:
                 self.sent[to, kind] += 1
                 datagrams.append(fuzzer.hostile() if kind == "hostile" else fuzzer.random())
-                self._twins[to].decode(datagrams[-1])
+                self.twins[to].decode(datagrams[-1])
         return datagrams
 
 
-def unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
+def _unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
     return {reason: dropped.get(reason, 0) for reason in UNREADABLE}
 
 
@@ -146,9 +142,9 @@ def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]
     """Compare unreadable datagrams sent and counted."""
     failures = []
     for name, process in processes.items():
-        counted = unreadable(process.events("ended")[-1]["dropped"])
-        if counted != relay.unreadable(name):
-            failures.append(f"the {name} counted {counted}, not {relay.unreadable(name)}")
+        counted, sent = map(_unreadable, (process.events("ended")[-1]["dropped"], relay.twins[name].dropped))
+        if counted != sent:
+            failures.append(f"the {name} counted {counted}, not {sent}")
     return failures
 
 
@@ -158,14 +154,11 @@ def _flown_s(plant: Process) -> float:
 
 
 def _memory_mib(processes: dict[str, Process]) -> dict[str, float]:
-    return {name: _rss(process.process.pid) / 2**20 for name, process in processes.items()}
-
-
-def _rss(pid: int) -> int:
-    try:
-        return int(psutil.Process(pid).memory_info().rss)
-    except psutil.NoSuchProcess:
-        return 0
+    alive = {name: it.process.poll() is None for name, it in processes.items()}
+    return {
+        name: psutil.Process(it.process.pid).memory_info().rss / 2**20 if alive[name] else 0.0
+        for name, it in processes.items()
+    }
 
 
 def _kernel_drops(processes: dict[str, Process]) -> int:

@@ -14,21 +14,15 @@ from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
-import pytest
 
 from colibri.analysis.logs import read_series
-from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
-from colibri.common.process.lifecycle import nudge_m
 from colibri.common.types import Array
 from colibri.mavlink.ulog.flight_topics import TRUTH, Topic
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 from tools.harness.observer import Observer
 
-REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 GIVE_UP_AFTER_S = 60.0
-begins_as_recorded = pytest.mark.skipif(nudge_m() != 0.0, reason="compares with a flight that began at its start")
-"""COLIBRI_NUDGE_M moves the start further than these tests permit."""
 THESIS_PLANT = (
     *("--vehicle", "hummingbird-thesis"),
     *("--integrator", "adaptive"),
@@ -51,25 +45,10 @@ def fly_thesis(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
     return fly(out, *options, "--profile", "thesis", lost=lost)
 
 
-def rows(path: Path) -> dict[str, Array]:
-    header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
-    table = np.genfromtxt(path, delimiter=",", skip_header=1)
-    return dict(zip(header, table.T, strict=True))
-
-
 def topic_rows(log: Path, topic: Topic = TRUTH) -> dict[str, Array]:
     """Read a topic of a log, or of a flight's folder, as columns."""
     flown = FlightFile(log / FILE if log.is_dir() else log)
     return dict(zip(topic.names, read_series(flown, topic, *topic.names), strict=True))
-
-
-def reference(track: str) -> dict[str, Array]:
-    return rows(REFERENCE / f"{track}.csv")
-
-
-def max_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: tuple[str, ...]) -> float:
-    assert set(columns) <= set(COLUMNS)
-    return float(max(np.abs(flown[column] - wanted[column]).max() for column in columns))
 
 
 def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_AFTER_S / 3600.0) -> None:

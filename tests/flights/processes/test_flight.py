@@ -10,7 +10,8 @@ import colibri
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.mavlink.ulog.flight_topics import DECISION
 from tests.support.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, fly_family
-from tools.harness.processes import fly, rows, topic_rows
+from tests.support.recorded import rows
+from tools.harness.processes import fly, topic_rows
 
 HUMMINGBIRD = colibri.load_vehicle("hummingbird")
 IDLE, MAX_SPEED = 83.8, 838.0

@@ -6,7 +6,8 @@ import pytest
 
 from colibri.cli.main import main
 from tests.support.paths import DIPS
-from tools.harness.processes import fly, rows
+from tests.support.recorded import rows
+from tools.harness.processes import fly
 
 
 def written(folder: Path, text: str, name: str = "points.csv") -> str:

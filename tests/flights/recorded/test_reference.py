@@ -10,7 +10,8 @@ import pytest
 
 from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 from colibri.plant.spec import PARTS
-from tools.harness.processes import begins_as_recorded, fly_thesis, max_difference, reference, rows
+from tests.support.recorded import begins_as_recorded, max_difference, reference, rows
+from tools.harness.processes import fly_thesis
 
 TRACKS = ("spiral", "line")
 SETTLED_RMS_M = {"spiral": 0.1254, "line": 0.0578}

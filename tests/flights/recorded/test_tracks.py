@@ -20,7 +20,8 @@ from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array
-from tools.harness.processes import fly, fly_thesis, max_difference, rows
+from tests.support.recorded import max_difference, rows
+from tools.harness.processes import fly, fly_thesis
 
 OUTER_US = 400_000
 SETTLED_RMS_M = {"expanding-spiral": 0.903, "wave": 0.805, "crown": 0.339}

@@ -22,7 +22,8 @@ from colibri.mavlink.ulog.blocks import EVERY_US
 from colibri.mavlink.ulog.flight_topics import DECISION, ESTIMATE
 from colibri.mavlink.ulog.reader import FlightFile
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.processes import rows, topic_rows
+from tests.support.recorded import rows
+from tools.harness.processes import topic_rows
 
 SPIRAL = ("fly", "spiral", "--quiet", "--no-figures", "--duration", "2")
 TOPICS = {"on_state": 18, "on_sensors": 22}

@@ -9,7 +9,8 @@ import pytest
 from colibri.common.process.lifecycle import nudge_m
 from colibri.plant.spec import PARTS
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.processes import fly, fly_thesis, rows, states, topic_rows
+from tests.support.recorded import rows
+from tools.harness.processes import fly, fly_thesis, states, topic_rows
 
 REALISTIC = ("spiral", "--profile", "thesis", "--vehicle", "hummingbird", "--integrator", "rk4", "--duration")
 TUMBLING = "x=1,y=2,z=20,phi=170,theta=-10,psi=123.4,vx=3,vy=-2,vz=1,p=10,q=-1,r=0.5,rotors=4000"

@@ -17,7 +17,8 @@ from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot_server import ArduPilotEnd
 from colibri.plant.vehicle.description import Rotors, VehicleError, load_vehicle
 from tests.support.ardupilot import pulses, read, request
-from tools.harness.processes import GIVE_UP_AFTER_S, Process, begins_as_recorded, running, topic_rows
+from tests.support.recorded import begins_as_recorded
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows
 
 VEHICLE = load_vehicle("hummingbird")
 PHYSICS = Physics(VEHICLE, "rk4")
