@@ -1,6 +1,7 @@
 """Series of a flight's figures, reduced to the points that can be shown."""
 
 from collections.abc import Iterable
+from math import ceil
 from typing import TypeAlias
 
 import numpy as np
@@ -13,71 +14,51 @@ from colibri.analysis.recording import (
     Samples,
     columns_of,
 )
-from colibri.common.compiled_rotations import quaternion_from_euler, rotation_matrix
-from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 
-_AT_ONCE = 1024
-
 
 class Extremes:
-    """Rows over time; beyond `most`, a multiple of 4, the two extremes of each column in spans below a pixel."""
+    """Rows over time; beyond `most` of at most so many, the two extremes of each column in spans below a pixel."""
 
-    def __init__(self, columns: int, most: int) -> None:
-        self._points: Array = np.empty((most, columns))
+    def __init__(self, columns: int, rows: int, most: int) -> None:
+        self._span = 2 * ceil(rows / most)
+        self._points: Array = np.empty((2 * ceil(rows / self._span), columns))
         self._count = 0
-        self._span = 2
         self._rest: Array = np.empty((0, columns))
 
     def add(self, rows: Array) -> None:
-        self._rest = np.concatenate([self._rest, rows])
-        while len(self._rest) >= self._span:
-            if self._count == len(self._points):
-                self._halve()
-                continue
-            spans = min(len(self._rest) // self._span, (len(self._points) - self._count) // 2)
-            taken, self._rest = np.split(self._rest, [spans * self._span])
-            self._points[self._count : self._count + 2 * spans] = _extremes(taken, self._span)
-            self._count += 2 * spans
+        rows = np.concatenate([self._rest, rows])
+        whole = len(rows) // self._span * self._span
+        count = self._count + 2 * whole // self._span
+        self._points[self._count : count] = _extremes(rows[:whole], self._span)
+        self._count, self._rest = count, rows[whole:]
 
     def points(self) -> list[Array]:
-        """Return all rows, or two a span, in parts of (k, columns)."""
+        """Return parts of (k, columns)."""
         rest = _extremes(self._rest, len(self._rest)) if len(self._rest) > 1 else self._rest
         return [self._points[: self._count], rest]
 
-    def _halve(self) -> None:
-        for first in range(0, self._count, _AT_ONCE):
-            points = self._points[first : first + _AT_ONCE]
-            self._points[first // 2 : (first + len(points)) // 2] = _extremes(points, 4)
-        self._count //= 2
-        self._span *= 2
-
 
 class EveryNth:
-    """Rows; beyond `most` every second, fourth or eighth, and the last."""
+    """Rows; beyond `most` of at most so many, every second, third and so on, and the last."""
 
-    def __init__(self, columns: int, most: int) -> None:
-        self._most = most
-        self._kept: list[Array] = []
-        self._count = self._seen = 0
-        self._step = 1
-        self._last: Array = np.empty((0, columns))
+    def __init__(self, columns: int, rows: int, most: int) -> None:
+        self._step, self._seen = ceil(rows / most), 0
+        self._points: Array = np.empty((rows // self._step + 2, columns))
+        self._count = 0
 
     def add(self, rows: Array) -> None:
-        self._last = rows[-1:].copy()
-        self._kept.append(rows[-self._seen % self._step :: self._step].copy())
-        self._count += len(self._kept[-1])
+        kept = rows[-self._seen % self._step :: self._step]
         self._seen += len(rows)
-        while self._count > self._most:
-            self._kept = [np.concatenate(self._kept)[::2].copy()]
-            self._count = len(self._kept[0])
-            self._step *= 2
+        self._points[self._count : self._count + len(kept)] = kept
+        self._count += len(kept)
+        self._points[self._count] = rows[-1]
 
     def points(self) -> list[Array]:
         """Return parts of (k, columns)."""
         is_kept = (self._seen - 1) % self._step == 0
-        return [*self._kept, self._last[: 0 if is_kept else 1]]
+        return [self._points[: self._count + (0 if is_kept else 1)]]
 
 
 def _extremes(rows: Array, span: int) -> Array:
@@ -94,8 +75,8 @@ POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
 ATTITUDE = ("phi", "theta", "psi")
 START_S = 10.0  # enlarged start, kept complete
-MAX_POINTS = 1 << 14  # points after the start: several for each pixel
-MAX_PATH_POINTS = 1 << 16  # points of a path: for an hour, chords are off by less than a pixel
+MAX_POINTS = 1 << 15  # points after the start: several for each pixel
+MAX_PATH_POINTS = 1 << 17  # points of a path: for an hour, chords are off by less than a pixel
 
 _SLOPES = tuple(f"{name}_ref" for name in VELOCITY)
 _ERRORS = tuple(f"e{axis}" for axis in POSITION)
@@ -107,14 +88,14 @@ _OF_REFERENCES = [_NAMES.index(name) for name in _SLOPES]
 
 
 class FigureSeries:
-    """Collects a flight for its figures part by part."""
+    """Collects a flight, of at most so many samples, for its figures part by part."""
 
-    def __init__(self, plan: FlightPlan, parts: Iterable[Samples] = ()) -> None:
+    def __init__(self, plan: FlightPlan, samples: int, parts: Iterable[Samples] = ()) -> None:
         self._rotors = plan.plant_vehicle.rotors
         self._names = _NAMES + columns_of(plan)[len(COLUMNS) :]
         self._start: list[Array] = []
-        self._later = Extremes(len(self._names), MAX_POINTS)
-        self._path = EveryNth(len(POSITION) + len(POSITION_REFERENCE), MAX_PATH_POINTS)
+        self._later = Extremes(len(self._names), samples, MAX_POINTS)
+        self._path = EveryNth(len(POSITION) + len(POSITION_REFERENCE), samples, MAX_PATH_POINTS)
         self._newest: Array = np.empty((0, len(self._names)))
         self._squares_m2 = 0.0
         self._settled = 0
@@ -131,8 +112,10 @@ class FigureSeries:
         rows = np.concatenate([self._newest, _rows(part)])
         if len(rows) > 1:
             rows[:, _OF_REFERENCES] = np.gradient(rows[:, _REFERENCES], rows[:, _T], axis=0)
-        self._keep(rows[max(known - 1, 0) : -1])
-        self._newest = rows[-2:].copy()
+        rows, self._newest = rows[max(known - 1, 0) : -1], rows[-2:].copy()
+        later = rows[:, _T] > START_S
+        self._start.append(rows[~later])
+        self._later.add(rows[later])
 
     def over_time(self) -> Series:
         """Return columns, angles in degrees, velocities, ENU, errors, their norm `distance`, its RMS once settled."""
@@ -148,11 +131,6 @@ class FigureSeries:
     def in_space(self) -> Series:
         """Return position and reference without times."""
         return _columns((*POSITION, *POSITION_REFERENCE), self._path.points())
-
-    def _keep(self, rows: Array) -> None:
-        later = rows[:, _T] > START_S
-        self._start.append(rows[~later])
-        self._later.add(rows[later])
 
 
 def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
@@ -175,13 +153,9 @@ def _rows(part: Samples) -> Array:
     return rows
 
 
-@compiled
 def _earth_velocity(attitudes: Array, velocities: Array) -> Array:
     """Turn velocities FLU (n, 3) to ENU by Euler angles (n, 3)."""
-    turned = np.empty_like(velocities)
-    for i in range(len(turned)):
-        R = rotation_matrix(quaternion_from_euler(attitudes[i, 0], attitudes[i, 1], attitudes[i, 2]))
-        u, v, w = velocities[i, 0], velocities[i, 1], velocities[i, 2]
-        for k in range(3):
-            turned[i, k] = R[k][0] * u + R[k][1] * v + R[k][2] * w
-    return turned
+    (u, v, w), (phi, theta, psi) = velocities.T, attitudes.T
+    y, z = v * np.cos(phi) - w * np.sin(phi), v * np.sin(phi) + w * np.cos(phi)
+    x, z = u * np.cos(theta) + z * np.sin(theta), z * np.cos(theta) - u * np.sin(theta)
+    return np.stack([x * np.cos(psi) - y * np.sin(psi), x * np.sin(psi) + y * np.cos(psi), z], axis=1)

@@ -83,7 +83,7 @@ def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
 
-    flown = FigureSeries(plan)
+    flown = FigureSeries(plan, summary.frames)
     found = keep_flight(plan, summary, *([flown.add] if figures else []))
     if figures:
         from colibri.analysis.figures import draw_flight

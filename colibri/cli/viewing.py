@@ -90,8 +90,8 @@ def plot(args: Namespace) -> int:
     from colibri.flights.provenance import plan_of
 
     try:
-        plan = plan_of(args.folder)
-        paths = draw_flight(FigureSeries(plan, FlightReader(plan)), plan)
+        reader = FlightReader(plan_of(args.folder))
+        paths = draw_flight(FigureSeries(reader.plan, reader.samples, reader), reader.plan)
     except Error as error:
         fail(f"{args.folder}: {error}" if str(args.folder) not in str(error) else str(error))
     except OSError as error:

@@ -125,7 +125,8 @@ class Flight:
         """
         from colibri.analysis.figures import figures_of
 
-        figures = figures_of(FigureSeries(self.plan, FlightReader(self.plan, self.log)), self.plan)
+        reader = FlightReader(self.plan, self.log)
+        figures = figures_of(FigureSeries(self.plan, reader.samples, reader), self.plan)
         if what not in figures:
             raise OptionError(unknown("figure", what, figures))
         return figures[what]()

@@ -93,8 +93,9 @@ def draw(flight: ThesisFlight, figures: Sequence[ThesisFigure], out: Path) -> li
         FlightSpec.of(flight.track, profile="thesis", controller=flight.controller, link="direct", out=folder)
     )
     write_provenance(plan)
-    flown = FigureSeries(plan)
-    keep_flight(plan, fly_locally(plan), flown.add)
+    summary = fly_locally(plan)
+    flown = FigureSeries(plan, summary.frames)
+    keep_flight(plan, summary, flown.add)
     series = flown.over_time()
     paths = []
     for figure in figures:

@@ -51,9 +51,7 @@ def fly(out: Path, duration_s: float) -> Flight:
 
 
 def figure_series(recording: Recording, plan: FlightPlan) -> FigureSeries:
-    flown = FigureSeries(plan)
-    flown.add(recording)
-    return flown
+    return FigureSeries(plan, len(recording.table), [recording])
 
 
 @pytest.fixture(scope="module")

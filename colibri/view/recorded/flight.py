@@ -196,7 +196,7 @@ def _ground_m(vehicle: Vehicle, place: Array) -> float:
 
 def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, headline: Array | None = None) -> Chart:
     """Return a chart of series (n, k), reduced to extremes."""
-    extremes = Extremes(values.shape[1] + 2, CHART_POINTS)
+    extremes = Extremes(values.shape[1] + 2, len(times_s), CHART_POINTS)
     shown = values[:, 0] if headline is None else headline
     extremes.add(np.column_stack([times_s, shown, values]))
     rows = np.vstack(extremes.points())

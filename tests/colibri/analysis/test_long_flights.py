@@ -124,9 +124,8 @@ def test_figures_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.M
     drawn = []
     for size in (ALL_ROWS, SOME_ROWS, A_BLOCK):
         in_blocks(monkeypatch, size)
-        flown = FigureSeries(plan)
-        for part in FlightReader(plan):
-            flown.add(part)
+        reader = FlightReader(plan)
+        flown = FigureSeries(plan, reader.samples, reader)
         drawn.append((flown.over_time(), flown.in_space()))
     for series, path in drawn[1:]:
         assert series.keys() == drawn[0][0].keys()
@@ -154,7 +153,7 @@ def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
 def peak_bytes(plan: FlightPlan) -> int:
     tracemalloc.start()
     try:
-        flown = FigureSeries(plan)
+        flown = FigureSeries(plan, FlightReader(plan).samples)
         keep_flight(plan, SUMMARY, flown.add)
         flown.over_time()
         return tracemalloc.get_traced_memory()[1]

@@ -26,7 +26,7 @@ def rows_of(count: int) -> Array:
 
 
 def reduced(kind: Any, rows: Array, most: int, part: int) -> Array:
-    series = kind(rows.shape[1], most)
+    series = kind(rows.shape[1], len(rows), most)
     for first in range(0, len(rows), part):
         series.add(rows[first : first + part])
     points: Array = np.concatenate(series.points())
@@ -34,16 +34,16 @@ def reduced(kind: Any, rows: Array, most: int, part: int) -> Array:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@given(count=st.integers(1, 300), part=st.integers(1, 100), quarter=st.integers(1, 10))
-def test_points_do_not_depend_on_the_parts(kind: Any, count: int, part: int, quarter: int) -> None:
-    rows, most = rows_of(count), 4 * quarter
+@given(count=st.integers(1, 300), part=st.integers(1, 100), half=st.integers(1, 20))
+def test_points_do_not_depend_on_the_parts(kind: Any, count: int, part: int, half: int) -> None:
+    rows, most = rows_of(count), 2 * half
     assert np.array_equal(reduced(kind, rows, most, part), reduced(kind, rows, most, count))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@given(count=st.integers(1, 300), part=st.integers(1, 100), quarter=st.integers(1, 10))
-def test_points_are_thinned_only_beyond_the_limit(kind: Any, count: int, part: int, quarter: int) -> None:
-    rows, most = rows_of(count), 4 * quarter
+@given(count=st.integers(1, 300), part=st.integers(1, 100), half=st.integers(1, 20))
+def test_points_are_thinned_only_beyond_the_limit(kind: Any, count: int, part: int, half: int) -> None:
+    rows, most = rows_of(count), 2 * half
     points = reduced(kind, rows, most, part)
     if count <= most:
         assert np.array_equal(points, rows)
