@@ -35,19 +35,8 @@ class LogFormat(NamedTuple):
     recorder: Callable[[LoggedVehicle, Write], FlightRecorder]
 
 
-class _Topics(TopicLog):
-    """Appends topics to the log of the current flight."""
-
-    def __init__(self, write: Write) -> None:
-        super().__init__()
-        self._write = write
-
-    def append(self, encoded: bytes) -> None:
-        self._write(encoded)
-
-
 ULOG = LogFormat(
-    ULOG_NAMES, 0, lambda it, write: Recorder(_Topics(write), it.name, it.system_id, it.parameters, with_battery=True)
+    ULOG_NAMES, 0, lambda it, write: Recorder(TopicLog(write), it.name, it.system_id, it.parameters, with_battery=True)
 )
 DATAFLASH = LogFormat(
     LogNames(".BIN", 8), 1, lambda it, write: DataFlashRecorder(write, it.parameters, it.banner, it.boot_unix_us)

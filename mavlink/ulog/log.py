@@ -1,6 +1,5 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
@@ -41,12 +40,13 @@ class TopicReader(Protocol):
     def encoded(self) -> Iterator[bytes]: ...
 
 
-class TopicLog(ABC):
-    """A log of a flight's topics; its methods raise `LogError` if writing fails."""
+class TopicLog:
+    """A log of a flight's topics, by `append` of messages; its methods raise `LogError` if writing fails."""
 
     for_viewers = True  # also PX4's topics, and inputs for replay
 
-    def __init__(self) -> None:
+    def __init__(self, append: Callable[[bytes], object]) -> None:
+        self.append = append
         self._waiting: dict[RowEncoder, list[bytes]] = {}
         self._queued: list[bytes] = []
         self._beginning = b""
@@ -73,9 +73,6 @@ class TopicLog(ABC):
             if waiting:
                 self._take(encoder)
 
-    @abstractmethod
-    def append(self, encoded: bytes) -> None: ...
-
     def close(self) -> None:
         with suppress(LogError):
             self.flush()
@@ -98,11 +95,11 @@ class FileLog(TopicLog):
     """A log in a file, opened with the first message, also after `close`."""
 
     def __init__(self, opened: Callable[[], LogFile]) -> None:
-        super().__init__()
+        super().__init__(self._append)
         self._opened = opened
         self._file: LogFile | None = None
 
-    def append(self, encoded: bytes) -> None:
+    def _append(self, encoded: bytes) -> None:
         if self._file is None:
             self._file = self._opened()
         self._file.append(encoded)
@@ -116,13 +113,10 @@ class FileLog(TopicLog):
 
 class MemoryLog(TopicLog):
     def __init__(self, *, for_viewers: bool = False) -> None:
-        super().__init__()
+        self._messages = bytearray()
+        super().__init__(self._messages.extend)
         self.for_viewers = for_viewers
         self._rows: dict[Topic, bytearray] = {topic: bytearray() for topic in FLIGHT_TOPICS}
-        self._messages = bytearray()
-
-    def append(self, encoded: bytes) -> None:
-        self._messages += encoded
 
     def blocks(self, topic: Topic) -> Iterator[Array]:
         self.flush()

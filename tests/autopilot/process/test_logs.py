@@ -30,11 +30,11 @@ SETUP = Setup(
 
 class Sizes(TopicLog):
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(self._append)
         self.size = 0
         self.last = b""
 
-    def append(self, encoded: bytes) -> None:
+    def _append(self, encoded: bytes) -> None:
         self.size += len(encoded)
         self.last = encoded
 

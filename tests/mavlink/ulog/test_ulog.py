@@ -45,10 +45,10 @@ def sample(time_us: int) -> dict[str, float]:
 
 class Appended(TopicLog):
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(self._append)
         self.content = b""
 
-    def append(self, encoded: bytes) -> None:
+    def _append(self, encoded: bytes) -> None:
         self.content += encoded
 
 
