@@ -203,23 +203,17 @@ def _schema(tree: Any, types: list[np.dtype[Any]]) -> dict[str, Any]:
 _MOST_LETTERS = 63  # of a name in MATLAB
 
 
-def write_mat(log: "ULog", path: Path, to: Path) -> Path:
-    """Write the log of `path`: Colibri's own topics by the names of their tables, others as logged."""
+def write_mat(log: "ULog", to: Path) -> Path:
+    """Write Colibri's own topics by the names of their tables, others as logged."""
     from scipy.io import savemat  # slow to load
 
-    own = {topic.name for topic in FLIGHT_TOPICS}
+    own = {topic.name: topic.table.removesuffix(".csv") for topic in FLIGHT_TOPICS}
     topics: dict[str, Any] = {}
-    try:
-        flight = FlightFile(path)
-    except LogFormatError:
-        own = set()
-    else:
-        for topic in FLIGHT_TOPICS:
-            if blocks := list(flight.blocks(topic)):
-                columns = np.concatenate(blocks).T
-                topics[topic.table.removesuffix(".csv")] = dict(zip(topic.names, columns, strict=True))
     for name, logged, _ in topics_of(log):
-        if name not in own:
+        if name in own:
+            columns = {column: values.astype(float) for column, values in logged.data.items() if column != "timestamp"}
+            topics[own[name]] = {"t": logged.data["timestamp"] / 1e6} | columns
+        else:
             topics[_name(name)] = {_name(column): values for column, values in logged.data.items()}
     savemat(to, topics, long_field_names=True, do_compression=True, oned_as="column")
     return to

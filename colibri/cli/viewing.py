@@ -118,7 +118,7 @@ def export(args: Namespace) -> int:
         if args.csv:
             written.append(formats.write_csv(log, tables))
         if args.mat:
-            written.append(formats.write_mat(log, path, path.with_suffix(".mat")))
+            written.append(formats.write_mat(log, path.with_suffix(".mat")))
         if args.parquet:
             written.append(formats.write_parquet(log, tables))
     except Error as error:
