@@ -1,7 +1,7 @@
 """Quality of a flight: `report.json`, and the table for people."""
 
 import json
-from math import degrees, isfinite
+from math import degrees, inf, isfinite
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -40,7 +40,9 @@ def report(
     wall_time_s, frames, resent = summary or (None, None, None)
     error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])
-    settled, within = error[t >= SETTLED_AFTER_S], _within(plan, t, error)
+    begin_s, end_s = plan.spec.window or (inf, inf)
+    within = error[(t >= begin_s - _INSTANT_S) & (t <= end_s + _INSTANT_S)]
+    settled = error[t >= SETTLED_AFTER_S]
     return {
         "track": str(plan.spec.track),
         "track_note": plan.track_note,
@@ -95,13 +97,6 @@ def report(
         "path_lag_s": flight.path_lag_s,
         "trajectory_sha256": flight.trajectory_sha256,
     }
-
-
-def _within(plan: FlightPlan, t: Array, error: Array) -> Array:
-    if (window := plan.spec.window) is None:
-        return error[:0]
-    within: Array = error[(t >= window.begin_s - _INSTANT_S) & (t <= window.end_s + _INSTANT_S)]
-    return within
 
 
 def _estimation_figures(plan: FlightPlan, log: TopicReader, settled: Array) -> Report:
