@@ -21,6 +21,8 @@ MAX_STREAMED = 128  # between two frames of the plant; the others are late, and 
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
+NOT_AVAILABLE = 0  # the interval in MESSAGE_INTERVAL, as PX4 and ArduPilot send it
+MAX_MESSAGE_ID = 0xFFFF  # that fits in MESSAGE_INTERVAL
 MAX_WAITING = 256  # limit of requested messages between two frames of the plant; more are rejected temporarily
 
 _OLD_REQUESTS = {
@@ -145,6 +147,8 @@ class StreamService:
         elif self._is_known(message_id):
             interval_us = -1
         else:
+            if 0 <= message_id <= MAX_MESSAGE_ID:
+                self._post([to(peer, "MESSAGE_INTERVAL", message_id, NOT_AVAILABLE)])
             return Refusal(f"no interval: {_named(message_id, asked)} is not streamed", UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 

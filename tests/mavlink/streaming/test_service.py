@@ -168,6 +168,12 @@ def test_intervals_can_be_asked_for(message_id: int, interval_us: int, way: int)
     assert (answer.fields.message_id, answer.fields.interval_us) == (message_id, interval_us)
 
 
+def test_the_interval_of_a_message_that_is_not_sent_is_0() -> None:
+    stream = flying()
+    assert ask(stream, GET, 246.0) == UNSUPPORTED
+    assert [send.fields for send in stream.poll(0)] == [(246, 0)]
+
+
 def test_a_message_comes_on_request_to_whoever_asks() -> None:
     stream = flying()
     assert ask(stream, REQUEST, HOME) == ACCEPTED
