@@ -1,12 +1,12 @@
 """Arming: what may, what may not, and why."""
 
 from colibri.mavlink.wire.dialect import mav
-from colibri.sitl import mission_items
+from colibri.sitl import mission_items as items
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario
 
-FAR_FENCE = mission_items.polygon([(100.0, 100.0), (110.0, 100.0), (110.0, 110.0), (100.0, 110.0)])
+FAR_FENCE = items.polygon([(100.0, 100.0), (110.0, 100.0), (110.0, 110.0), (100.0, 110.0)])
 ARM_DISARM: int = mav.MAV_CMD_COMPONENT_ARM_DISARM
 WRONG_MAGIC = 2989.0
 
@@ -42,7 +42,7 @@ SCENARIOS = (
         name="refused-with-a-bad-fence-radius",
         peer="AP: refused",
         holds="the upload is refused; arming succeeds, without a fence",
-        steps=(do.refused(do.upload_fence(mission_items.circle(-3.0)), "fence"), do.arm(), do.check(see.ARMED)),
+        steps=(do.refused(do.upload_fence(items.circle(-3.0)), "fence"), do.arm(), do.check(see.ARMED)),
     ),
     Scenario(
         name="refused-when-tilted",

@@ -2,7 +2,7 @@
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
-from colibri.sitl import mission_items
+from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
 from tests.scenarios.words import steps as do
@@ -130,7 +130,7 @@ SCENARIOS = (
         holds="return within 0.5 s of the breach",
         steps=(
             *(do.put("GF_ACTION", 3), do.put("RTL_RETURN_ALT", 6.0)),
-            do.upload_fence(mission_items.polygon([(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)])),
+            do.upload_fence(items.polygon([(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)])),
             do.by_hand(do.then(do.run(0.3), do.select(Mode.POSITION))),
             do.by_hand(
                 do.then(do.until(see.away(10.0), within=10.0), do.until(see.mode(Mode.RETURN), within=0.5)), pitch=1.0
@@ -157,7 +157,7 @@ SCENARIOS = (
         peer="AP: FAILED",
         holds="refused; holds position",
         steps=(
-            do.upload_fence(mission_items.circle(10.0)),
+            do.upload_fence(items.circle(10.0)),
             do.run(0.3),
             do.refused(do.goto((30.0, 0.0, 5.0), wait=False), "outside"),
             do.hold(see.every(see.near(PLACE, 0.02), see.mode(Mode.HOLD)), for_=1.0),

@@ -2,7 +2,6 @@
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
-from colibri.sitl import mission_items
 from colibri.sitl.flight_record import Columns, tilt_deg
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import missions
@@ -127,8 +126,7 @@ SCENARIOS = (
         peer="PX4: a stuck sensor, the mission ends within 90 s",
         holds="ends; lands within 3 m",
         steps=(
-            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            do.start_mission,
+            *missions.ALONG_THE_CORRIDOR,
             do.run(10.0),
             do.inject("sensor_baro", "stuck"),
             do.until(see.DISARMED, within=80.0),

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
-from colibri.sitl import mission_items
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import holding, missions, offboard, takeoff_land
 from tests.scenarios.words import conditions as see
@@ -112,8 +111,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: the mission ends",
         holds="killed five times: ends at its last item",
         steps=(
-            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            do.start_mission,
+            *missions.ALONG_THE_CORRIDOR,
             lands_after(5, 6.0),
             do.measured("the distance from the square", missions.off_the_square, 1.2),
             do.check(see.over(0.0, 0.0, 0.2)),
@@ -124,8 +122,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: the mission ends",
         holds="killed three times: lands within 3 m of its last item",
         steps=(
-            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            do.start_mission,
+            *missions.ALONG_THE_CORRIDOR,
             lands_after(3, 9.0),
             do.check(see.every(see.DISARMED, see.over(0.0, 0.0, 3.0))),
         ),

@@ -9,7 +9,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.wire.dialect import Codec, mav
-from colibri.sitl import mission_items
+from colibri.sitl import mission_items as items
 from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
@@ -119,7 +119,7 @@ SCENARIOS = (
         holds="each item refused; the mission stays empty",
         steps=(
             *(
-                do.refused(do.upload([on_wire(**wrong)]), "mission")
+                do.refused(do.upload(on_wire(**wrong)), "mission")
                 for wrong in (
                     {"x": 2_000_000_000},
                     {"z": nan},
@@ -138,9 +138,9 @@ SCENARIOS = (
         peer="AP: refused",
         holds="two corners, negative and infinite radius: refused; arming succeeds, without a fence",
         steps=(
-            do.refused(do.upload_fence(mission_items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
-            do.refused(do.upload_fence(mission_items.circle(-1.0)), "fence"),
-            do.refused(do.upload_fence(mission_items.circle(inf)), "fence"),
+            do.refused(do.upload_fence(items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
+            do.refused(do.upload_fence(items.circle(-1.0)), "fence"),
+            do.refused(do.upload_fence(items.circle(inf)), "fence"),
             do.arm(),
             do.check(see.ARMED),
         ),

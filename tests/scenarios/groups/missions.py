@@ -1,7 +1,7 @@
 """Missions: flown as uploaded, refused where they cannot be."""
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.sitl import mission_items
+from colibri.sitl import mission_items as items
 from colibri.sitl.flight_record import Columns
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
@@ -9,10 +9,11 @@ from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario
 
 SQUARE = ((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0))
-CORRIDOR = [mission_items.waypoint(east, north, 10.0, within_m=1.0) for east, north in SQUARE]
-STEPS = [mission_items.waypoint(5.0 * (n % 2), 0.0, 5.0) for n in range(4)]
-LONG = [mission_items.waypoint(0.5 * n, 1.0 * (n % 2), 5.0, within_m=0.5) for n in range(20)]
-FIELD = mission_items.polygon([(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)])
+CORRIDOR = [items.waypoint(east, north, 10.0, within_m=1.0) for east, north in SQUARE]
+STEPS = [items.waypoint(5.0 * (n % 2), 0.0, 5.0) for n in range(4)]
+LONG = [items.waypoint(0.5 * n, 1.0 * (n % 2), 5.0, within_m=0.5) for n in range(20)]
+ALONG_THE_CORRIDOR = do.upload(items.takeoff(10.0), *CORRIDOR, items.land(0.0, 0.0)), do.start_mission
+FIELD = items.polygon([(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)])
 
 
 def off_the_square(columns: Columns) -> float:
@@ -52,8 +53,7 @@ SCENARIOS = (
         peer="PX4: 5 m to either side, at most 500 s",
         holds="1.1 m to either side, 80 s",
         steps=(
-            do.upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
-            do.start_mission,
+            *ALONG_THE_CORRIDOR,
             do.until(see.DISARMED, within=80.0),
             do.measured("the distance from the square", off_the_square, 1.1),
             do.check(see.over(0.0, 0.0, 0.1)),
@@ -64,7 +64,7 @@ SCENARIOS = (
         peer="PX4: to 0.3 m within 10 s each, home within 2 m",
         holds="0.3 m within 7 s each, home within 0.05 m",
         steps=(
-            do.upload([mission_items.takeoff(5.0), *STEPS, mission_items.return_home()]),
+            do.upload(items.takeoff(5.0), *STEPS, items.return_home()),
             do.start_mission,
             do.until(see.near((0.0, 0.0, 5.0), 0.3), within=10.0),
             *(do.until(see.near((5.0 * (n % 2), 0.0, 5.0), 0.3), within=7.0) for n in range(1, 4)),
@@ -77,20 +77,14 @@ SCENARIOS = (
         name="upload-over-a-lossy-link",
         peer="MAVSDK: 5 % loss, 20 items, up = down",
         holds="20 % loss each way, 20 items, correct count",
-        steps=(do.trouble("ground", loss=0.2), do.upload(LONG), do.trouble("ground", loss=0.0), reads_back(20)),
+        steps=(do.trouble("ground", loss=0.2), do.upload(*LONG), do.trouble("ground", loss=0.0), reads_back(20)),
     ),
     Scenario(
         name="pause-and-resume",
         peer="ours",
         holds="stops within 4 s of the pause, then ends the mission",
         steps=(
-            do.upload(
-                [
-                    mission_items.takeoff(5.0),
-                    mission_items.waypoint(25.0, 0.0, 5.0),
-                    mission_items.waypoint(25.0, 5.0, 5.0),
-                ]
-            ),
+            do.upload(items.takeoff(5.0), items.waypoint(25.0, 0.0, 5.0), items.waypoint(25.0, 5.0, 5.0)),
             do.start_mission,
             do.until(see.away(8.0), within=20.0),
             do.select(Mode.HOLD),
@@ -114,7 +108,7 @@ SCENARIOS = (
         holds="refused, with the item",
         steps=(
             do.upload_fence(FIELD),
-            do.upload([mission_items.takeoff(5.0), mission_items.waypoint(50.0, 0.0, 5.0)]),
+            do.upload(items.takeoff(5.0), items.waypoint(50.0, 0.0, 5.0)),
             do.run(0.3),
             do.refused(do.start_mission, "outside the geofence"),
             do.check(see.DISARMED),
@@ -132,13 +126,11 @@ SCENARIOS = (
         holds="items 1 and 2 twice, then the last",
         steps=(
             do.upload(
-                [
-                    mission_items.takeoff(5.0),
-                    mission_items.waypoint(4.0, 0.0, 5.0),
-                    mission_items.waypoint(0.0, 0.0, 5.0),
-                    mission_items.jump(1, 1),
-                    mission_items.waypoint(0.0, 3.0, 5.0),
-                ]
+                items.takeoff(5.0),
+                items.waypoint(4.0, 0.0, 5.0),
+                items.waypoint(0.0, 0.0, 5.0),
+                items.jump(1, 1),
+                items.waypoint(0.0, 3.0, 5.0),
             ),
             do.start_mission,
             do.until(see.near((4.0, 0.0, 5.0), 0.3), within=20.0),
@@ -153,8 +145,7 @@ SCENARIOS = (
         peer="PX4: 5 m to either side of the corridor",
         holds="2.5 m to either side, lands within 2 m",
         steps=(
-            do.upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
-            do.start_mission,
+            *ALONG_THE_CORRIDOR,
             do.until(see.DISARMED, within=90.0),
             do.measured("the distance from the square", off_the_square, 2.5),
             do.check(see.over(0.0, 0.0, 2.0)),
@@ -167,12 +158,10 @@ SCENARIOS = (
         holds="5 m/s, then 8 m/s on the leg after the speed item",
         steps=(
             do.upload(
-                [
-                    mission_items.takeoff(5.0),
-                    mission_items.waypoint(25.0, 0.0, 5.0, within_m=1.0),
-                    mission_items.change_speed(8.0),
-                    mission_items.waypoint(25.0, 50.0, 5.0),
-                ]
+                items.takeoff(5.0),
+                items.waypoint(25.0, 0.0, 5.0, within_m=1.0),
+                items.change_speed(8.0),
+                items.waypoint(25.0, 50.0, 5.0),
             ),
             do.start_mission,
             do.until(see.near((25.0, 0.0, 5.0), 1.0), within=25.0),

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from colibri.common.types import Array, Vector
+from colibri.mavlink.mission.items import MissionItem
 from colibri.sitl.flight_record import Columns, tilt_deg
 from colibri.sitl.ground_station import RefusedError
+from colibri.sitl.mission_items import Item
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.conditions import Condition
 from tests.scenarios.words.scenario import Step
@@ -33,12 +35,17 @@ def _nothing(_: Sitl) -> None:
 
 
 run, arm, disarm, takeoff, land, select = map(_order, ("run", "arm", "disarm", "takeoff", "land", "select"))
-put, upload, upload_fence, inject = map(_order, ("set_param", "upload_mission", "upload_fence", "inject"))
+put, upload_fence, inject = map(_order, ("set_param", "upload_fence", "inject"))
 start_mission, kill_autopilot = methodcaller("start_mission"), methodcaller("kill_autopilot")
 
 
 def goto(place: Vector, *, yaw_deg: float = nan, speed: float = -1.0, wait: bool = True) -> Step:
     return lambda sitl: sitl.goto(*place, yaw=radians(yaw_deg), speed=speed, wait=wait)
+
+
+@word
+def upload(sitl: Sitl, *plan: Item | MissionItem) -> None:
+    sitl.upload_mission(plan)
 
 
 @word
