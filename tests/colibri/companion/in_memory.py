@@ -1,7 +1,7 @@
 """A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.control.profile import load_profile
@@ -99,6 +99,10 @@ class Ride(Generic[Flown]):
         while not condition():
             assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
             self.step()
+
+    def flying(self, within_s: float) -> Self:
+        self.until(lambda: self.companion.phase is CompanionPhase.FLYING, within_s)
+        return self
 
     def to_the_end(self, within_s: float) -> CompanionEnd:
         self.until(lambda: self.companion.ended is not None, within_s)

@@ -101,8 +101,7 @@ def test_hold_is_refused_three_times_before_land(refusals: int, mode: int) -> No
                 return REJECTED
             return super()._set_mode(params)
 
-    ride = hovering(vehicle=Unwilling())
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride = hovering(vehicle=Unwilling()).flying(8.0)
     ride.companion.stop("SIGHUP")
     assert ride.to_the_end(9.0).in_order is (mode == PX4_HOLD)
     assert ride.sitl.mode == mode
@@ -165,8 +164,7 @@ class _FullDisk(StringIO):
 
 
 def test_a_log_that_cannot_be_written_hands_the_vehicle_over() -> None:
-    ride = hovering()
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride = hovering().flying(8.0)
     log = _Log(_FullDisk(), FlightSummary())
     while ride.companion.ended is None:
         ride.step()
@@ -218,8 +216,7 @@ def test_another_sender_does_not_take_the_link() -> None:
     ],
 )
 def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str, within_s: float) -> None:
-    ride = hovering()
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride = hovering().flying(8.0)
     ride.sitl.silent.add(message)
     ride.until(lambda: ride.companion.phase is not CompanionPhase.FLYING, within_s)
     assert ride.companion.limit is not None
@@ -228,8 +225,7 @@ def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str
 
 
 def test_stuck_body_rates_end_the_flight_before_it_leans() -> None:
-    ride = hovering()
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride = hovering().flying(8.0)
     ride.sitl.frozen_rate = (0.0, 1.5, 0.0)
     leaned = 0.0
     while ride.companion.ended is None:
@@ -241,8 +237,7 @@ def test_stuck_body_rates_end_the_flight_before_it_leans() -> None:
 
 
 def test_an_identification_that_is_stopped_is_not_complete() -> None:
-    ride = hovering(CompanionSettings(identifies=True))
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride = hovering(CompanionSettings(identifies=True)).flying(8.0)
     (order,) = Codec(0, 0).decode(ride.companion.last_order()[0])
     assert (order.name, order.fields.command) == ("COMMAND_LONG", mav.MAV_CMD_DO_SET_MODE)
     ride.companion.stop("SIGINT")

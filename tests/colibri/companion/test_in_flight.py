@@ -44,14 +44,8 @@ def moves_of(ride: Ride[Sitl], since_us: int = 0) -> list[int]:
     return [fields.command for fields in said if fields.command in MOVES]
 
 
-def in_air(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
-    return Ride(flights.begin(airborne=3.0), HOVER, settings or CompanionSettings(), **more)
-
-
-def flying(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
-    ride = in_air(flights, settings, **more)
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 10.0)
-    return ride
+def in_air(flights: Flights, settings: CompanionSettings | None = None) -> Ride[Sitl]:
+    return Ride(flights.begin(airborne=3.0), HOVER, settings or CompanionSettings())
 
 
 def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> None:
@@ -69,7 +63,7 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
 
 
 def test_a_pilot_s_mode_is_obeyed_at_once_and_never_fought(flights: Flights) -> None:
-    ride = flying(flights)
+    ride = in_air(flights).flying(10.0)
     orders_us = ride.now_us
     ride.sitl.gcs.send("COMMAND_LONG", 1, 1, mav.MAV_CMD_DO_SET_MODE, 0, 1.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0)
     ride.until(lambda: ride.sitl.mode is Mode.RETURN, 1.0)
@@ -83,13 +77,6 @@ def test_a_pilot_s_mode_is_obeyed_at_once_and_never_fought(flights: Flights) -> 
     assert ride.sitl.mode is Mode.RETURN
     assert not moves_of(ride, chosen_us)
     assert not names_of(ride, ended_us)
-
-
-def test_interrupted_it_hands_over(flights: Flights) -> None:
-    ride = flying(flights)
-    ride.companion.stop("interrupted")
-    assert ride.to_the_end(3.0).in_order
-    assert ride.sitl.mode is Mode.HOLD
 
 
 def test_it_never_arms_unless_it_may(flights: Flights) -> None:
@@ -205,7 +192,7 @@ AS_IT_IS = FlightLimits()
 def test_each_limit_ends_it_and_leaves_the_vehicle_in_hold(
     flights: Flights, name: str, provoke: Callable[[Ride[Sitl]], Callable[[], None] | None], limits: FlightLimits
 ) -> None:
-    ride = flying(flights, CompanionSettings(limits=limits))
+    ride = in_air(flights, CompanionSettings(limits=limits)).flying(10.0)
     for _ in range(100):
         ride.step()
     goes_on = provoke(ride)

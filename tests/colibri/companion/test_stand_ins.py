@@ -7,7 +7,6 @@ import pytest
 
 from colibri.companion.identification import identified
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.supervision.phases import CompanionPhase
 from tests.colibri.companion.in_memory import Ride
 from tests.colibri.companion.stand_in import (
     GUIDED,
@@ -47,8 +46,7 @@ def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
 )
 def test_px4_s_rates_may_follow_late_and_overshoot(numbers: Numbers) -> None:
     vehicle = Px4(numbers=numbers)
-    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=6.0))
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 30.0)
+    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=6.0)).flying(30.0)
     turning = []
     while ride.companion.ended is None:
         ride.step()
@@ -74,8 +72,7 @@ def test_the_hover_thrust_is_refined_in_flight(made: Callable[[], StandIn]) -> N
 @pytest.mark.parametrize(("made", "choice"), [(Px4, 7 << 16), (ArduPilot, STABILIZE)])
 def test_a_pilot_s_mode_is_obeyed_within_a_tenth_of_a_second(made: Callable[[], StandIn], choice: int) -> None:
     vehicle = made()
-    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True))
-    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 30.0)
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True)).flying(30.0)
     vehicle.choose(choice)
     chosen_us, orders = ride.now_us, len(vehicle.modes)
     ride.to_the_end(1.0)
