@@ -35,16 +35,18 @@ class Good:
         wanted = np.array([roll, pitch, references.yaw_rad[0]])
         moment = self.inertia * (100.0 * (wanted - state.euler) - 18.0 * np.array(state.rate_flu_rad_s))
         speeds = self.mixer.rotor_speeds(np.array([self.mass * (self.gravity + az), *moment]))
-        return float(np.linalg.norm(error)), colibri.Decision(speeds, tuple(wanted))
+        return float(np.linalg.norm(error)), self.given(colibri.Decision(speeds, tuple(wanted)))
+
+    def given(self, decision: Any) -> Any:
+        return decision
 
 
 class Stateful(Good):
     asked = 0
 
-    def step(self, *args: Any) -> tuple[Any, Any]:
+    def given(self, decision: Any) -> Any:
         self.asked += 1
-        memory, decision = super().step(*args)
-        return memory, decision._replace(rotor_speeds=decision.rotor_speeds * (1.0 - 1e-6 * (self.asked % 7)))
+        return decision._replace(rotor_speeds=decision.rotor_speeds * (1.0 - 1e-6 * (self.asked % 7)))
 
 
 class Remembering(Good):
@@ -64,9 +66,8 @@ class Unpicklable(Good):
 
 
 class Random(Good):
-    def step(self, *args: Any) -> tuple[Any, Any]:
-        memory, decision = super().step(*args)
-        return memory, decision._replace(rotor_speeds=decision.rotor_speeds * (1.0 - 1e-9 * next(_COUNT)))
+    def given(self, decision: Any) -> Any:
+        return decision._replace(rotor_speeds=decision.rotor_speeds * (1.0 - 1e-9 * next(_COUNT)))
 
 
 class BuiltOtherwise(Good):
@@ -80,10 +81,9 @@ class Overwriting(Good):
         super().__init__(*args)
         self.speeds = np.zeros(4)
 
-    def step(self, *args: Any) -> tuple[Any, Any]:
-        memory, decision = super().step(*args)
+    def given(self, decision: Any) -> Any:
         self.speeds[:] = decision.rotor_speeds
-        return memory, decision._replace(rotor_speeds=self.speeds)
+        return decision._replace(rotor_speeds=self.speeds)
 
 
 class Scribbling(Good):
@@ -114,21 +114,18 @@ class TooFast(Good):
 
 
 class Listed(Good):
-    def step(self, *args: Any) -> tuple[Any, Any]:
-        memory, decision = super().step(*args)
-        return memory, decision._replace(rotor_speeds=decision.rotor_speeds.tolist())
+    def given(self, decision: Any) -> Any:
+        return decision._replace(rotor_speeds=decision.rotor_speeds.tolist())
 
 
 class NoAngles(Good):
-    def step(self, *args: Any) -> tuple[Any, Any]:
-        memory, decision = super().step(*args)
-        return memory, decision._replace(attitude_reference=None)
+    def given(self, decision: Any) -> Any:
+        return decision._replace(attitude_reference=None)
 
 
 class NoDiagnostics(Good):
-    def step(self, *args: Any) -> tuple[Any, Any]:
-        memory, decision = super().step(*args)
-        return memory, decision._replace(diagnostics=None)
+    def given(self, decision: Any) -> Any:
+        return decision._replace(diagnostics=None)
 
 
 class Drifting(Good):
