@@ -8,19 +8,12 @@ from colibri.common.types import Address
 from colibri.mavlink.node.hub import KEY_REFUSED
 from colibri.mavlink.wire.dialect import Codec
 from colibri.sitl.vehicle import Sitl
+from tests.support.clock import Clock
 
 pytestmark = pytest.mark.sitl(ready=False)
 HEARTBEAT = Codec(255, 190).encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
 HERE: Address = ("127.0.0.1", 5)
 FRAME_S = 0.004
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 class FakeLink:

@@ -14,6 +14,7 @@ from colibri.mavlink.links.open import beyond_loopback, check_reach, open_ground
 from colibri.mavlink.links.serial_port import MIN_QUEUE_BYTES, REOPEN_AFTER_S, SerialLink
 from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.framing import Framer
+from tests.support.clock import Clock
 
 BAUD = 57600
 TIMEOUT_S = 5.0
@@ -25,14 +26,6 @@ def text(number: int) -> bytes:
 
 def happened(link: SerialLink) -> list[object]:
     return [*link.receive_now(), *link.take_opened(), *link.take_closed(), *link.take_notes()]
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 class Device:

@@ -17,6 +17,11 @@ def heartbeat(system_id: int = 7, component_id: int = 9) -> bytes:
     return Codec(system_id, component_id).encode("HEARTBEAT", *HEARTBEAT)
 
 
+def packed(message: Any, *, old: bool = False) -> bytes:
+    """Return a frame of pymavlink's."""
+    return bytes(message.pack(common.MAVLink(None, srcSystem=7, srcComponent=9), force_mavlink1=old))
+
+
 def test_sequence_numbers_count_and_wrap() -> None:
     codec = Codec(1, 1)
     sequence = [codec.encode("HEARTBEAT", *HEARTBEAT)[4] for _ in range(257)]
@@ -125,13 +130,9 @@ def test_parameter_bits_are_read_in_place_by_other_software(pattern: int) -> Non
 
 def test_a_parameter_may_still_be_a_float_and_come_in_mavlink_1() -> None:
     codec = Codec(7, 9)
-    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
     parameter = common.MAVLink_param_set_message(1, 1, b"A", 2.5, 9)
-    old = bytes(parameter.pack(mav, force_mavlink1=True))
-    assert codec.encode("PARAM_SET", 1, 1, b"A", 2.5, 9) == bytes(
-        common.MAVLink_param_set_message(1, 1, b"A", 2.5, 9).pack(common.MAVLink(None, srcSystem=7, srcComponent=9))
-    )
-    (message,) = codec.decode(old)
+    assert codec.encode("PARAM_SET", 1, 1, b"A", 2.5, 9) == packed(parameter)
+    (message,) = codec.decode(packed(parameter, old=True))
     assert param_bits(message) == 0x40200000
 
 
@@ -145,17 +146,14 @@ def test_parameter_bits_survive_truncated_zeros(value: bytes) -> None:
 
 def test_fields_of_an_extension_may_be_left_out() -> None:
     q = (1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3)
-    mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
-    assert Codec(1, 1).encode("ATTITUDE_QUATERNION", 4, *q) == bytes(
-        common.MAVLink_attitude_quaternion_message(4, *q).pack(mav)
-    )
+    expected = packed(common.MAVLink_attitude_quaternion_message(4, *q))
+    assert Codec(7, 9).encode("ATTITUDE_QUATERNION", 4, *q) == expected
 
 
 def test_text_and_mavlink_1_are_messages_too() -> None:
     codec = Codec(7, 9)
     text = codec.encode("STATUSTEXT", 6, b"hello")
-    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
-    old = bytes(common.MAVLink_heartbeat_message(*HEARTBEAT).pack(mav, force_mavlink1=True))
+    old = packed(common.MAVLink_heartbeat_message(*HEARTBEAT), old=True)
     names = [message.name for message in codec.decode(text + heartbeat() + old)]
     assert names == ["STATUSTEXT", "HEARTBEAT", "HEARTBEAT"]
     assert not codec.dropped

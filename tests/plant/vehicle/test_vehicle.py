@@ -8,16 +8,9 @@ import pytest
 
 from colibri import plant
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from tests.support.commands import edited
 
 FILE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"
-
-
-def written(tmp_path: Path, old: str, new: str) -> str:
-    text = FILE.read_text(encoding="utf-8")
-    assert text.count(old) == 1
-    path = tmp_path / "vehicle.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return str(path)
 
 
 def test_hover_is_at_the_speed_that_carries_the_weight() -> None:
@@ -60,7 +53,7 @@ def test_rotor_momentum_by_the_sense_of_rotation() -> None:
         ('speed_unit = "rad/s"', 'speed_unit = "hertz"', "rotors.speed_unit"),
         ('["ccw", "cw", "ccw", "cw"]', '["ccw", "ccw", "ccw", "ccw"]', "position_m, direction"),
         ("[-0.171, 0.0]", "[0.171, 0.0]", "position_m, direction"),
-        ("gravity_m_s2 = 9.81", "gravity_m_s2 = ", "vehicle.toml"),
+        ("gravity_m_s2 = 9.81", "gravity_m_s2 = ", FILE.name),
         ("foot_depth_m = 0.05", "foot_depth_m = -0.05", "ground.foot_depth_m"),
         ("empty_voltage_v = 9.0", "empty_voltage_v = 13.0", "battery: empty_voltage_v: must not lie above"),
         ("efficiency = 0.75", "efficiency = 1.5", "battery.efficiency"),
@@ -69,8 +62,8 @@ def test_rotor_momentum_by_the_sense_of_rotation() -> None:
 )
 def test_a_wrong_file_is_refused_by_file_and_key(tmp_path: Path, old: str, new: str, key: str) -> None:
     with pytest.raises(VehicleError, match=key) as error:
-        load_vehicle(written(tmp_path, old, new))
-    assert "vehicle.toml" in str(error.value)
+        load_vehicle(edited(tmp_path, FILE, old, new))
+    assert FILE.name in str(error.value)
     assert "\n" not in str(error.value)
 
 
