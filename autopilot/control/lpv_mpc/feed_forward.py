@@ -22,6 +22,8 @@ from colibri.common.types import Array
 
 HEADING_ABOVE = 0.15  # least vertical part of body z at which the yaw has a meaning
 _TWIST_RAD_S = 4.0  # of the return to it
+_STRONG_WIND = 0.2  # horizontal force, in parts of the weight, beyond which errors of velocity count as distances
+_STOP_S, _MAX_STOP_S, _IN_GUSTS_M_S = 10.0, 2.0, 0.3  # for each part beyond; at most; error that does not count
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
@@ -71,7 +73,8 @@ def follow(
     if not law[0].turns:
         go_on_turning(rigid, law[0].interval_s, target.yaw_rad)
     if limits.upright:
-        approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
+        feasible = feasible_part(v, a, disturbance, limits, vehicle)
+        approach(rigid[:3], rigid[3:6], (p, v, a), feasible, stopping_s(disturbance, vehicle), law, near)
     else:
         put(p, near[0])
         put(v, near[1])
@@ -301,28 +304,32 @@ def approach(
     velocity: Array,
     references: tuple[Array, Array, Array],
     feasible: float,  # part of their motion
+    stop_s: float,  # of `stopping_s`
     packed: Packed,
     near: tuple[Array, Array, Array],
 ) -> None:
     """Write references, ENU, (n, 3) each, that lead from the vehicle to the given ones.
 
-    Near references stay as given. For farther ones the error decays with the gains, slowed down to the largest
-    acceleration; an error above the largest closes at constant speed. An impossible motion that is far away counts in
-    part: it must not lead the vehicle astray.
+    Near references stay as given, in strong wind only if the vehicle has about their velocity. For farther ones the
+    error decays with the gains, slowed down to the largest acceleration; an error above the largest closes at constant
+    speed. An impossible motion that is far away counts in part: it must not lead the vehicle astray.
     """
     law = packed[0]
-    away, squared = np.empty(3), 0.0
+    away, squared, late = np.empty(3), 0.0, 0.0
     for i in range(3):
         away[i] = references[0][0, i] - position[i]
         squared += away[i] * away[i]
+        missing = references[1][0, i] - velocity[i]
+        late += missing * missing
     distance = sqrt(squared)
-    if distance <= law.exact_within_m:
+    reach = max(distance, stop_s * (sqrt(late) - _IN_GUSTS_M_S))
+    if reach <= law.exact_within_m:
         for order in range(3):
             for n in range(references[order].shape[0]):
                 put(references[order][n], near[order][n])
         return
-    part = max(min(1.0, law.follow_within_m / distance), feasible)
-    smooth = 1.0 - law.exact_within_m / distance
+    part = max(law.follow_within_m / max(distance, law.follow_within_m), feasible)
+    smooth = 1.0 - law.exact_within_m / reach
     is_far, h = distance > law.max_error_m, law.interval_s
     error, error_rate, drift = np.zeros(3), np.empty(3), np.zeros(3)
     for i in range(3):
@@ -362,6 +369,14 @@ def feasible_part(
             squared += force * force
         worst = max(worst, squared)
     return min(max(2.0 - sqrt(worst) / limits.max_n, 0.0), 1.0)
+
+
+@compiled
+def stopping_s(disturbance: Disturbance, vehicle: Packed) -> float:
+    """Return the time by which an error of velocity becomes a distance: strong wind leaves less force to stop with."""
+    x, y, _ = disturbance.acceleration
+    strength: float = sqrt(x * x + y * y) / vehicle[0].airframe.gravity_m_s2
+    return min(max(_STOP_S * (strength - _STRONG_WIND), 0.0), _MAX_STOP_S)
 
 
 @compiled

@@ -76,11 +76,12 @@ class TargetBuilder:
             steady[3][:], ending[3][:] = nominal[3], nominal[3][-3:]
         near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
         feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, self._law, near)
+        stop_s = feed_forward.stopping_s(now.disturbance, mpc.model)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self._law, near)
         feed_forward.ask(
             now.rigid, near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat
         )
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, self._law, near)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, stop_s, self._law, near)
         feed_forward.ask(now.rigid, *ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
         target.yaw_rad[:], target.end_squared[:] = nominal[3], last_flat.squared[1]

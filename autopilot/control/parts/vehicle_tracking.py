@@ -11,6 +11,7 @@ from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     ESTIMATES,
     MEASURED,
     ObserverSettings,
+    limit_near_ground,
     observe,
     observer_of,
 )
@@ -142,5 +143,7 @@ def look(
         estimate[6:] = 0.0
     if airborne:
         mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], mass)
+    else:
+        limit_near_ground(estimate, estimate_before, observer)
     voltage_v, current_a = terminal(open_v, speeds, battery)
     return mass_kg, voltage_v / battery[0].full_voltage_v, current_a

@@ -16,6 +16,7 @@ from colibri.common.kernels import exp
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
+_NEAR_GROUND = 0.2  # of the largest moment: a larger one comes from the feet
 ESTIMATES = 12  # velocity, m/s (ENU); body rates, rad/s; disturbances: acceleration, m/s² (ENU), and moment, N m
 MEASURED = 9  # velocity, m/s (ENU); body rates, rad/s; body z axis (ENU)
 
@@ -101,3 +102,12 @@ def observe(
         disturbance = estimate[9 + i] + observer.angular_acceleration * innovation * inertia[i]
         after[9 + i] = min(max(disturbance, -observer.max_moment_n_m), observer.max_moment_n_m)
     return after
+
+
+@compiled
+def limit_near_ground(estimate: Array, before: Array, packed: Packed) -> None:
+    """Limit the lift and the moments: those of the feet end with the take-off."""
+    estimate[8] = min(estimate[8], max(before[8], _NEAR_GROUND * packed[0].max_acceleration_m_s2))
+    for i in range(9, ESTIMATES):
+        most = max(abs(before[i]), _NEAR_GROUND * packed[0].max_moment_n_m)
+        estimate[i] = min(max(estimate[i], -most), most)

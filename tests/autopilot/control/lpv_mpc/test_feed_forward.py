@@ -77,7 +77,7 @@ Three: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 def approached(position: np.ndarray, velocity: np.ndarray, feasible: float) -> tuple[Three, Three]:
     p, v, a, _ = circle(3.0, 3.0)
     references, near = (p, v, a), (np.empty_like(p), np.empty_like(p), np.empty_like(p))
-    feed_forward.approach(position, velocity, references, feasible, packed(GUIDANCE), near)
+    feed_forward.approach(position, velocity, references, feasible, 0.0, packed(GUIDANCE), near)
     return references, near
 
 
@@ -108,11 +108,23 @@ def test_the_approach_is_smooth_and_within_its_acceleration() -> None:
     still = np.zeros((STEPS + 2, 3))
     p, v, a = near = (still.copy(), still.copy(), still.copy())
     position, velocity = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -6.0])
-    feed_forward.approach(position, velocity, (still, still, still), 1.0, packed(GUIDANCE), near)
+    feed_forward.approach(position, velocity, (still, still, still), 1.0, 0.0, packed(GUIDANCE), near)
     assert np.linalg.norm(a, axis=1).max() < 10.0
     assert a[0, 2] > 5.0
     assert np.diff(p, axis=0) / INTERVAL_S == pytest.approx(0.5 * (v[1:] + v[:-1]), abs=1e-3)
     assert np.diff(v, axis=0) / INTERVAL_S == pytest.approx(0.5 * (a[1:] + a[:-1]), abs=1e-3)
+
+
+@pytest.mark.parametrize(("wind_m_s2", "speed_m_s", "exact"), [(5.0, 3.0, False), (5.0, 0.2, True), (1.0, 3.0, True)])
+def test_in_strong_wind_a_near_vehicle_stops_gently(wind_m_s2: float, speed_m_s: float, exact: bool) -> None:
+    still = np.zeros((STEPS + 2, 3))
+    stop_s = feed_forward.stopping_s(Disturbance(np.array([wind_m_s2, 0.0, 0.0]), np.zeros(3)), PACKED)
+    p, v, a = near = (still.copy(), still.copy(), still.copy())
+    velocity = np.array([speed_m_s, 0.0, 0.0])
+    feed_forward.approach(still[0], velocity, (still, still, still), 1.0, stop_s, packed(GUIDANCE), near)
+    assert (not p.any() and not v.any() and not a.any()) is exact
+    assert exact or speed_m_s > v[0, 0] > 0.9 * speed_m_s > v[-1, 0]
+    assert np.linalg.norm(a, axis=1).max() < GUIDANCE.max_acceleration_m_s2
 
 
 def test_what_comes_after_a_jump_is_not_followed_before_it() -> None:

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
-from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, ObserverModel, gains, observe
+from colibri.autopilot.control.vehicle_model.disturbance_observer import (
+    ESTIMATES,
+    MEASURED,
+    ObserverModel,
+    gains,
+    limit_near_ground,
+    observe,
+)
 from colibri.common.jit import packed
 
 INTERVAL_S = 0.008
@@ -48,6 +55,18 @@ def test_no_more_is_estimated_than_the_limit() -> None:
     estimate = fly(np.array([5.0, 0.0, -5.0]), np.array([0.01, 0.0, 0.0]), 2.0, cautious)
     assert estimate[6:9] == pytest.approx([1.0, 0.0, -1.0])
     assert estimate[9] == pytest.approx(1e-3)
+
+
+def test_near_the_ground_only_small_lifts_and_moments_are_learned() -> None:
+    found, before = np.array([*range(6), 3.0, -3.0, 3.0, 0.25, -0.25, 0.25]), np.zeros(ESTIMATES)
+    before[11] = 0.2
+    estimate = found.copy()
+    limit_near_ground(estimate, before, packed(OBSERVER))
+    assert estimate[8:] == pytest.approx([1.2, 0.06, -0.06, 0.2])
+    assert (estimate[:8] == found[:8]).all()
+    estimate[8] = -3.0
+    limit_near_ground(estimate, before, packed(OBSERVER))
+    assert estimate[8] == -3.0, "a payload"
 
 
 def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
