@@ -24,7 +24,7 @@ _SETTLED_S = 1.5  # after take-off and before landing
 _AVERAGED_S = 0.04
 _TRAINED = 0.75  # part of the flight; the rest is held out
 _WIDEST = 0.3  # relative half-width of an interval; wider: the number is kept
-_EXPLAINED = 0.5  # least part of roll and pitch acceleration that follows from the commands
+_CROSSED = 0.3  # largest part of the pitch moment that turns a vehicle in roll, or the other way round
 _YAW_INERTIA = 0.15  # 95 % of vehicles: Iz / (Ix + Iy) is that near the first file's
 _RARE = 0.1  # of inertia and torque: uncertain if commands are too rare for the lag
 
@@ -59,13 +59,14 @@ def identify(motion: Motion, vehicle: Vehicle) -> Identified:
     rotors = flight.shares(lag) if flight.speed is None else flight.speed
     channels = [*_body_channels(flight, rotors), *_speed_channels(flight, lag)]
     solutions = {channel.quantity: _solve(channel) for channel in channels}
-    for name, _, acceleration, *_ in channels[:3]:
-        c, off, left = solutions[name]
-        unexplained = c[0] < off[0] or (left * left).mean() > (1.0 - _EXPLAINED) * np.var(acceleration)
-        if c[0] < -off[0] or (unexplained and name != "yaw"):
+    roll, pitch, *_ = channels
+    yaw = solutions["yaw"]
+    for mine, other in ((roll, pitch), (pitch, roll)):
+        c, off, _ = _solve(mine._replace(x=np.column_stack([mine.x, other.x[:, 0]])))
+        if c[0] < off[0] or abs(c[-1]) - off[-1] > _CROSSED * c[0] or yaw.c[0] < -yaw.off[0]:
             raise LogError(
-                f"the {name} acceleration does not follow from the commands with these positions and"
-                " directions of the rotors: look at --layout and --order"
+                "the motion does not follow from the commands with these positions and directions of the rotors: look"
+                " at --layout and --order"
             )
     held_out = []
     for quantity, unit, y, x, t_s in channels:
