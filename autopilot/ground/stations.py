@@ -163,7 +163,7 @@ class Stations:
             self._obeys,
             self.streams,
             TimeService(),
-            ParameterService(parameters, as_floats=wire.numbers_as_floats),
+            ParameterService(parameters, self._text, as_floats=wire.numbers_as_floats),
             self.plans,
             self.offboard,
             self.manual,

@@ -6,6 +6,7 @@ from math import isfinite
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, bits_of, value_of
+from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
 INTERVAL_US = 2_000  # between two parameters of a list: 150 take 0.3 s
@@ -28,9 +29,9 @@ class ParameterService:
 
     handles = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
 
-    def __init__(self, parameters: Parameters, *, as_floats: bool = False) -> None:
+    def __init__(self, parameters: Parameters, text: StatusText, *, as_floats: bool = False) -> None:
         """Serve `parameters`; `as_floats` has values as floats, and unknown names unanswered."""
-        self._parameters, self._as_floats = parameters, as_floats
+        self._parameters, self._text, self._as_floats = parameters, text, as_floats
         self._listings: dict[int, _Listing] = {}
         self._proposed: dict[str, list[Peer]] = {}  # who waits for `Parameters.settle`
 
@@ -92,11 +93,13 @@ class ParameterService:
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:
-            return self._unknown(peer, name, BY_ID)
+            told = () if self._as_floats else self._text.say(WARNING, f"{name} not changed: there is no such parameter")
+            return (*self._unknown(peer, name, BY_ID), *told)
         value = _number(definition, bits) if self._as_floats else _meant(definition, wire_type, bits)
         outcome = value if isinstance(value, ParamError) else self._parameters.propose(name, value)
         if isinstance(outcome, ParamError):
-            return (_refuse(peer, name, index, outcome), self._value(index))
+            told = self._text.say(WARNING, f"{name} not changed: {_reason(definition, value, outcome)}")
+            return (_refuse(peer, name, index, outcome), self._value(index), *told)
         if not outcome:
             return (self._value(index),)
         self._proposed.setdefault(name, []).append(peer)
@@ -132,6 +135,13 @@ def _number(definition: Parameter, bits: int) -> Value | ParamError:
     if definition.kind == ParamType.REAL:
         return value
     return round(value) if isfinite(value) else ParamError.VALUE_OUT_OF_RANGE
+
+
+def _reason(definition: Parameter, value: Value | ParamError, refusal: ParamError) -> str:
+    if refusal is not ParamError.VALUE_OUT_OF_RANGE or isinstance(value, ParamError):
+        return refusal.name.lower().replace("_", " ")
+    choices = ", ".join(str(choice) for choice, _ in definition.values)
+    return f"{value:g} is not {choices or f'within {definition.minimum:g} to {definition.maximum:g}'}"
 
 
 def _refuse(peer: Peer, name: str, index: int, refusal: ParamError) -> Send:

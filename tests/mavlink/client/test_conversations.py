@@ -67,7 +67,8 @@ class Rig:
         for name, data in (("0.ulg", LOG), ("1.ulg", b"")):
             memory.create(("logs", name))
             memory.write(("logs", name), 0, data)
-        services = (self.commands, ParameterService(self.parameters), self.ground.service, Logs(memory, ("logs",)))
+        held = ParameterService(self.parameters, StatusText())
+        services = (self.commands, held, self.ground.service, Logs(memory, ("logs",)))
         self.client = Client(255, 190)
         self.link = Link(TryingVehicle(self.parameters, *services), [self.client], seed, loss=loss, unruly=unruly)
 

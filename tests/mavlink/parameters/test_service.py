@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, ParamError, Parameter, Parameters, ParamType
+from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 
 VEHICLE = Codec(1, AUTOPILOT_COMPONENT)
@@ -35,7 +36,7 @@ def parameters_of(count: int = 0) -> Parameters:
 
 class Talk:
     def __init__(self, parameters: Parameters) -> None:
-        self.parameters, self.service = parameters, ParameterService(parameters)
+        self.parameters, self.service = parameters, ParameterService(parameters, StatusText())
         self.now_us = 0
 
     def ask(self, name: str, *fields: Any, peer: Peer = ME) -> list[Message]:
@@ -125,12 +126,18 @@ def test_a_set_is_told_to_everybody() -> None:
 def test_who_is_refused_hears_why_and_what_holds(name: str, value: Any, kind: int, refusal: ParamError) -> None:
     parameters = parameters_of()
     held = parameters[name]
-    error, value_message = Talk(parameters).set(name, value, kind)
+    error, value_message, told, *_ = Talk(parameters).set(name, value, kind)
     index = parameters.index(name)
     assert (error.name, error.fields.param_id, error.fields.error) == ("PARAM_ERROR", name, refusal)
     assert (error.fields.target_system, error.fields.target_component) == (ME.system, ME.component)
     assert (value_message.name, value_message.fields.param_index) == ("PARAM_VALUE", index)
     assert parameters[name] == held
+    reason = (
+        {"LIMITED": "3 is not within 0 to 2"}.get(name, "")
+        if refusal is ParamError.VALUE_OUT_OF_RANGE
+        else refusal.name.split("_")[0].lower()
+    )
+    assert told.fields.text.startswith(f"{name} not changed: {reason}")
 
 
 def test_an_integer_sent_as_float_is_accepted_if_exact() -> None:
@@ -143,8 +150,9 @@ def test_an_integer_sent_as_float_is_accepted_if_exact() -> None:
 
 
 def test_setting_what_does_not_exist() -> None:
-    (error,) = Talk(parameters_of()).set("NOTHING", 1.0, REAL32)
+    error, told = Talk(parameters_of()).set("NOTHING", 1.0, REAL32)
     assert (error.name, error.fields.param_id) == ("PARAM_ERROR", "NOTHING")
+    assert told.fields.text == "NOTHING not changed: there is no such parameter"
     assert (error.fields.error, error.fields.param_index) == (ParamError.DOES_NOT_EXIST, -1)
 
 
@@ -221,7 +229,7 @@ def test_a_list_goes_on_when_simulated_time_begins_anew() -> None:
 )
 def test_nothing_raises(name: str, param_id: bytes, bits: int, kind: int, index: int, now_us: int) -> None:
     fields = {"PARAM_SET": (param_id, Bits(bits), kind), "PARAM_REQUEST_READ": (param_id, index)}.get(name, ())
-    service = ParameterService(parameters_of())
+    service = ParameterService(parameters_of(), StatusText())
     (message,) = STATION.decode(STATION.encode(name, 1, 1, *fields))
     sends = [*service.receive(message, ME, now_us), *service.poll(now_us + 10_000)]
     assert len(heard(sends)) == len(sends)
