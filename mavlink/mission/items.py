@@ -84,7 +84,8 @@ def fault_of(item: MissionItem, result: int) -> str:
     if not 0 <= number < _PARAMETERS:
         return name
     value = item[_FIRST_PARAMETER + number]
-    place = misplaced(item.x * DEGREES, item.y * DEGREES) if number in (4, 5) else ""
+    x, y = (nan if each == NOT_GIVEN else each * DEGREES for each in (item.x, item.y))
+    place = misplaced(x, y) if number in (4, 5) else ""
     height = misplaced_height(value) if number == _PARAMETERS - 1 else ""
     return f"{name}: {place or height or f'parameter {number + 1} is {value:g}'}"
 

@@ -10,9 +10,11 @@ from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import ACCEPTED, QUICK
 
+NAN = 2**31 - 1  # as a coordinate
 UPLOADS = [
     ("upload_mission", items.Item(mav.MAV_CMD_NAV_SPLINE_WAYPOINT, (), (1.0, 0.0, 4.0)), "mission item 1: NAV_SPLINE"),
     ("upload_mission", MissionItem(3, mav.MAV_CMD_NAV_WAYPOINT, 1, 0, 0, 0, 0, 0, 0, 5.0), "latitude 0, longitude 0"),
+    ("upload_mission", MissionItem(3, mav.MAV_CMD_NAV_WAYPOINT, 1, 0, 0, 0, 0, NAN, NAN, 5.0), "latitude nan"),
     ("upload_mission", items.jump(7, 1), "mission item 1: DO_JUMP (177): parameter 1 is 7"),
     ("upload_rally", items.waypoint(1.0, 0.0, 5.0), "rally item 1: NAV_WAYPOINT (16) is not supported"),
     ("upload_fence", items.circle(-3.0)[0], "parameter 1 is -3"),
