@@ -1,7 +1,8 @@
 """The estimator on synthetic flights: how it begins, how well it knows, and what it does when sensors fail."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from math import hypot, nan
+from math import hypot, inf, nan
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.sensing.rejection import Reason, RejectedSource
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.rotations import earth_from_body
-from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
 from colibri.mavlink.wire.dialect import mav
 from tests.support import sensor_source as source
 from tests.support.estimates import Change, at, error_m, estimates, estimator, known, last, parts, recorded
@@ -70,6 +71,23 @@ def shaken(frame: SensorFrame, t: float) -> SensorFrame:
     return frame._replace(specific_force_flu_m_s2=(x + 2.0 * np.sin(40.0 * t), y, z))
 
 
+def magnetised(frame: SensorFrame) -> SensorFrame:
+    x, y, z = frame.magnetic_field_flu_gauss
+    return frame._replace(magnetic_field_flu_gauss=(x, y + 0.3, z))
+
+
+def told(lie: Callable[[GpsFix], GpsFix]) -> Callable[[SensorFrame], SensorFrame]:
+    return lambda frame: frame if frame.gps is None else frame._replace(gps=lie(frame.gps))
+
+
+def moved(east_m: float) -> Callable[[SensorFrame], SensorFrame]:
+    return told(lambda fix: replace(fix, place=geodetic_of((east_m, 0.0, 0.0), fix.place)))
+
+
+def since(from_s: float, change: Callable[[SensorFrame], SensorFrame], until_s: float = inf) -> Change:
+    return lambda frame, t: change(frame) if from_s <= t < until_s else frame
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -127,14 +145,8 @@ def test_a_hover_without_gps_drifts_and_recovers_smoothly(seed: int) -> None:
 
 
 def test_a_glitch_is_not_followed() -> None:
-    def glitch(frame: SensorFrame, t: float) -> SensorFrame:
-        if frame.gps is None or not 10.0 <= t < 15.0:
-            return frame
-        east = geodetic_of((50.0, 0.0, 0.0), frame.gps.place)
-        return frame._replace(gps=replace(frame.gps, place=east))
-
     flight = recorded(source.hover, 8, 20.0)
-    of = estimates(flight.frames, glitch)
+    of = estimates(flight.frames, since(10.0, moved(50.0), 15.0))
     during, after = at(of, 14.0), last(of)
     assert during.health.gps_glitch
     assert not during.health.dead_reckoning
@@ -144,12 +156,7 @@ def test_a_glitch_is_not_followed() -> None:
 
 
 def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
-    def elsewhere(frame: SensorFrame, t: float) -> SensorFrame:
-        if frame.gps is None or t < 10.0:
-            return frame
-        return frame._replace(gps=replace(frame.gps, place=geodetic_of((5.0, 0.0, 0.0), frame.gps.place)))
-
-    of = estimates(recorded(source.hover, 8, 32.0).frames, elsewhere)
+    of = estimates(recorded(source.hover, 8, 32.0).frames, since(10.0, moved(5.0)))
     after = last(of)
     assert after.resets == 1
     assert after.frame.position_enu_m[0] == pytest.approx(5.0, abs=1.0)
@@ -172,23 +179,15 @@ def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
     ],
 )
 def test_an_impossible_fix_is_counted(change: dict[str, object], reason: Reason) -> None:
-    def spoilt(frame: SensorFrame, t: float) -> SensorFrame:
-        if frame.gps is None or t < 3.0:
-            return frame
-        return frame._replace(gps=replace(frame.gps, **change))  # type: ignore[arg-type]
-
-    after = last(estimates(recorded(source.hover, 4, 5.0).frames, spoilt))
+    spoilt = told(lambda fix: replace(fix, **change))  # type: ignore[arg-type]
+    after = last(estimates(recorded(source.hover, 4, 5.0).frames, since(3.0, spoilt)))
     assert set(after.rejected) == {(RejectedSource.GPS, reason)}
     assert after.health.gps_lost_since_us is not None
 
 
 def test_a_magnet_nearby_does_not_turn_it() -> None:
-    def magnet(frame: SensorFrame, t: float) -> SensorFrame:
-        x, y, z = frame.magnetic_field_flu_gauss
-        return frame._replace(magnetic_field_flu_gauss=(x, y + 0.3, z)) if t >= 8.0 else frame
-
     flight = recorded(source.hover, 2, 30.0)
-    of = estimates(flight.frames, magnet)
+    of = estimates(flight.frames, since(8.0, magnetised))
     during, after = at(of, 12.0), last(of)
     assert RejectedSource.MAGNETOMETER in during.health.not_accepted
     assert during.health.heading
@@ -200,10 +199,8 @@ def test_a_magnet_nearby_does_not_turn_it() -> None:
 
 
 def test_a_barometer_that_jumps_does_not_lift_it() -> None:
-    def jump(frame: SensorFrame, t: float) -> SensorFrame:
-        return frame._replace(pressure_pa=frame.pressure_pa - 300.0) if t >= 10.0 else frame
-
     flight = recorded(source.hover, 2, 25.0)
+    jump = since(10.0, lambda frame: frame._replace(pressure_pa=frame.pressure_pa - 300.0))
     of = estimates(flight.frames, jump)
     during, after = at(of, 14.0), last(of)
     assert RejectedSource.BAROMETER in during.health.not_accepted
@@ -214,11 +211,8 @@ def test_a_barometer_that_jumps_does_not_lift_it() -> None:
 
 
 def test_a_stuck_barometer_is_seen() -> None:
-    def stuck(frame: SensorFrame, t: float) -> SensorFrame:
-        return frame._replace(pressure_pa=95000.0) if t >= 6.0 else frame
-
     flight = recorded(source.climb, 2, 14.0)
-    of = estimates(flight.frames, stuck)
+    of = estimates(flight.frames, since(6.0, lambda frame: frame._replace(pressure_pa=95000.0)))
     assert last(of).rejected[RejectedSource.BAROMETER, Reason.FROZEN] > 300
     assert RejectedSource.BAROMETER in last(of).health.not_accepted
     assert error_m(flight, of, 13.9) < 1.0
@@ -226,21 +220,17 @@ def test_a_stuck_barometer_is_seen() -> None:
 
 @pytest.mark.parametrize("bad", [nan, float("inf"), 1e6, -1e6])
 def test_short_nonsense_of_inertial_sensors_is_bridged(bad: float) -> None:
-    def nonsense(frame: SensorFrame, t: float) -> SensorFrame:
-        if not 12.0 <= t < 12.02:
-            return frame
+    def nonsense(frame: SensorFrame) -> SensorFrame:
         return frame._replace(rate_flu_rad_s=(bad, 0.0, 0.0), specific_force_flu_m_s2=(0.0, 0.0, bad))
 
     flight = recorded(source.circle, 2, 20.0)
-    of = estimates(flight.frames, nonsense)
+    of = estimates(flight.frames, since(12.0, nonsense, 12.02))
     assert max(error_m(flight, of, t) for t in np.arange(11.0, 20.0, 0.25)) < 1.0
 
 
 @pytest.mark.parametrize("axes", ["rate_flu_rad_s", "specific_force_flu_m_s2"])
 def test_a_frozen_inertial_sensor_is_told(axes: str) -> None:
-    def frozen(frame: SensorFrame, t: float) -> SensorFrame:
-        return frame._replace(**{axes: (0.01, 0.02, 0.03)}) if t >= 5.0 else frame  # type: ignore[arg-type]
-
+    frozen = since(5.0, lambda frame: frame._replace(**{axes: (0.01, 0.02, 0.03)}))  # type: ignore[arg-type]
     after = last(estimates(recorded(source.hover, 2, 7.0).frames, frozen))
     assert sum(count for (_, reason), count in after.rejected.items() if reason is Reason.FROZEN) > 400
     assert after.health.gyroscope == (axes != "rate_flu_rad_s")
