@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import development as mavlink2
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
+from colibri.mavlink.mission.items import PLAN_TYPES
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.observer import Sight
 from tools.harness.processes import SitlProcess, vehicle
@@ -90,11 +91,7 @@ def test_it_gets_all_that_it_asks_for_when_it_connects(tmp_path: Path) -> None:
             indices.add(station.wait("PARAM_VALUE").param_index)
         assert indices == set(range(value.param_count))
 
-        for mission_type in (
-            mavlink2.MAV_MISSION_TYPE_MISSION,
-            mavlink2.MAV_MISSION_TYPE_FENCE,
-            mavlink2.MAV_MISSION_TYPE_RALLY,
-        ):
+        for mission_type in PLAN_TYPES:
             station.mav.mission_request_list_send(1, 1, mission_type)
             count = station.wait("MISSION_COUNT")
             assert (count.count, count.mission_type) == (0, mission_type)

@@ -59,18 +59,13 @@ def test_lag_and_inertia_are_not_below_those_of_the_true_vehicle() -> None:
     assert found.rotors.direction == true.rotors.direction
 
 
-def test_a_vehicle_from_data_sheets_flies_the_true_one() -> None:
-    true, found = load_vehicle(str(TRUE_CF21)), written(CF21)
+@pytest.mark.parametrize(("sheet", "arms"), [(CF21, 0.1), (CF21._replace(drag_n_s_m=None), 0.25)])
+def test_a_vehicle_from_data_sheets_flies_the_true_one(sheet: DataSheet, arms: float) -> None:
+    true = load_vehicle(str(TRUE_CF21))
     options = {"track": lemniscate(true), "plant_vehicle": true}
-    flown = fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, found)
+    flown = fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, written(sheet))
     assert not flown.lost
-    assert flown.error_m < 0.1 * CF21.arm_m
-
-
-def test_without_drag_a_small_vehicle_stays_within_a_quarter_arm() -> None:
-    true, found = load_vehicle(str(TRUE_CF21)), written(CF21._replace(drag_n_s_m=None))
-    options = {"track": lemniscate(true), "plant_vehicle": true}
-    assert fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, found).error_m < 0.25 * CF21.arm_m
+    assert flown.error_m < arms * CF21.arm_m
 
 
 def test_a_thrust_stand_wins_over_estimates() -> None:
