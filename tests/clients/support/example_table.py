@@ -5,14 +5,76 @@ want a device: ftp_list_dir and ftp_download_file (a serial port), rtk_base_ublo
 px4_ev_automation_keyboard (a keyboard).
 """
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.wire.dialect import mav
 from tests.clients.support import example_flights as flights
-from tests.clients.support import example_services as services
-from tests.clients.support.example_services import Judge, plans, prints
+from tests.clients.support.example_flights import Evidence
 
 PARAMETERS = "some.params"
 URL = "udpin://0.0.0.0:14540"
+Judge: TypeAlias = Callable[[Evidence], None]
+
+
+def plans(missions: int, rally: int, fence: int) -> Judge:
+    kinds = (mav.MAV_MISSION_TYPE_MISSION, mav.MAV_MISSION_TYPE_RALLY, mav.MAV_MISSION_TYPE_FENCE)
+    wanted = {"mission items": missions, "rally points": rally, "fence items": fence}
+
+    def judge(evidence: Evidence) -> None:
+        assert list(map(evidence.seen.plan_length, kinds)) == list(wanted.values())
+
+    judge.__doc__ = "The vehicle has " + " and ".join(f"{count} {name}" for name, count in wanted.items() if count)
+    return judge
+
+
+def prints(pattern: str, times: int, shows: str) -> Judge:
+    def judge(evidence: Evidence) -> None:
+        evidence.client.wait_printed(pattern, times=times)
+
+    judge.__doc__ = shows
+    return judge
+
+
+def airspeeds(evidence: Evidence) -> None:
+    """20 × AIRSPEED reach the other ground station."""
+    assert evidence.seen.counts["AIRSPEED"] >= 20, evidence.seen.counts
+
+
+def calibration(evidence: Evidence) -> None:
+    """All four calibrations come to their end."""
+    for kind in ("gyro", "accel", "mag", "level"):
+        assert f"[cal] calibration done: {kind}" in evidence.seen.texts
+
+
+def all_params(evidence: Evidence) -> None:
+    """Every parameter is printed."""
+    count = evidence.seen.request("PARAM_VALUE", "PARAM_REQUEST_READ", "", 0).param_count
+    assert len(re.findall(r"(?m)^[A-Z][A-Z0-9_]*: [-\d.e]+$", evidence.client.printed)) == count
+
+
+def logs(evidence: Evidence) -> None:
+    """The log of the flight before is the file that the vehicle keeps, byte for byte."""
+    kept = sorted((evidence.state / "0" / "logs").iterdir())
+    got = sorted(evidence.client.folder.glob("log-*.ulog"))
+    assert kept
+    assert [path.read_bytes() for path in got] == [path.read_bytes() for path in kept]
+    assert len(got[0].read_bytes()) > 50_000
+
+
+def uploaded_parameters(evidence: Evidence) -> None:
+    """The vehicle has the numbers of the file."""
+    assert evidence.seen.parameter("MIS_TAKEOFF_ALT") == 7.5
+    assert evidence.seen.parameter("RTL_RETURN_ALT") == 42.0
+
+
+def untouched(evidence: Evidence) -> None:
+    """The vehicle stands as before."""
+    now = evidence.seen.now
+    assert (now.mode, now.armed, now.flying) == (Mode.HOLD, False, False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +124,14 @@ EXAMPLES: tuple[Example, ...] = (
     Example("manual_control", flights.manual_control, endless=True),
     Example("follow_me_example", flights.follow_me, within_s=90.0),
     Example("failure_injection", flights.failure_injection, within_s=90.0, options=("--feedback", "sensors")),
-    Example("calibration", services.calibration),
-    Example("all_params", services.all_params),
+    Example("calibration", calibration),
+    Example("all_params", all_params),
     Example("firmware_version", prints(r"flight_sw_major: \d+", 1, "A version is printed")),
     Example("geofence", plans(0, 0, 5)),
-    Example("logfile_download", services.logs, after="takeoff_and_land"),
-    Example("tune", services.untouched),
-    Example("send_status_message", services.untouched),  # its server is mostly ended before the line is sent
-    Example("mavlink_direct_send", services.airspeeds),
+    Example("logfile_download", logs, after="takeoff_and_land"),
+    Example("tune", untouched),
+    Example("send_status_message", untouched),  # its server is mostly ended before the line is sent
+    Example("mavlink_direct_send", airspeeds),
     _streams("mavlink_direct_receive", "ATTITUDE from 1/1", 100, "100 × ATTITUDE"),
     _streams("highres_imu", r"Time \(us\)", 400, "400 × HIGHRES_IMU"),
     _streams("telemetry", r"Position: |In air: False|Battery: |GPS info: ", 100, "100 lines"),
@@ -78,12 +140,12 @@ EXAMPLES: tuple[Example, ...] = (
     _streams("px4_ev_automation", "Flight Mode: HOLD", 2, "Landed state and flight mode, after 15 s"),
     Example(
         "upload_params",
-        services.uploaded_parameters,
+        uploaded_parameters,
         arguments=(URL, PARAMETERS),
         written={PARAMETERS: "# of two\n1\t1\tMIS_TAKEOFF_ALT\t7.5\t9\n1\t1\tRTL_RETURN_ALT\t42.0\t9\n"},
     ),
-    Example("rtcm", services.untouched),
+    Example("rtcm", untouched),
     _streams("transponder", "Waiting for transponder messages", 3, "Waits; nobody else flies here"),
     Example("shell", prints("nsh> ", 1, "A prompt; it ends at once by itself")),
-    Example("show_debug_output", services.untouched),
+    Example("show_debug_output", untouched),
 )
