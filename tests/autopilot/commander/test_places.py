@@ -73,12 +73,8 @@ def test_commands_to_nowhere_are_refused(command: str, frame: int | None, place:
 
 @pytest.mark.parametrize("command", STAYS)
 def test_commands_that_stay_here_warn_of_a_place_elsewhere(command: str) -> None:
-    for place, warned in (
-        ((LATITUDE - 18.0, LONGITUDE), True),
-        ((91.0, 8.0), True),
-        ((0.0, 0.0), False),
-        ((nan, nan), False),
-    ):
+    far = (LATITUDE - 18.0, LONGITUDE)
+    for place, warned in ((far, True), ((91.0, 8.0), True), ((0.0, 0.0), False), ((nan, nan), False)):
         result, said = ask(flying(), command, None, *place, nan)
         assert (result, "here, not at" in said) == (ACCEPTED, warned)
 

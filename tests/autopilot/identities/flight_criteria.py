@@ -290,13 +290,8 @@ def guided_submodes(sitl: Sitl) -> None:
 def global_positions(sitl: Sitl) -> None:
     sitl.takeoff(20.0)
     home = latest(sitl, "HOME_POSITION")
-    for frame, up in (
-        (0, home.altitude * 1e-3 + 20.0),
-        (5, home.altitude * 1e-3 + 20.0),
-        (3, 20.0),
-        (6, 20.0),
-        (11, 20.0),
-    ):
+    above_sea_m = home.altitude * 1e-3 + 20.0
+    for frame, up in ((0, above_sea_m), (5, above_sea_m), (3, 20.0), (6, 20.0), (11, 20.0)):
         x, y = home.latitude + 500, home.longitude
         sitl.send("SET_POSITION_TARGET_GLOBAL_INT", 0, 1, 1, frame, 3576, x, y, up, *(0.0,) * 8)
         sitl.wait_until(lambda: dist(sitl.position, (0.0, 5.56, 20.0)) < 2.0, within=20.0)

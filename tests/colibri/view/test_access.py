@@ -75,14 +75,8 @@ def test_only_marked_scripts_run_on_the_page(server: PageServer) -> None:
 
 def test_names_and_texts_from_outside_are_text() -> None:
     hostile = "</p><img src=x onerror='alert(1)'> **bold** &lt;\n\x1b"
-    now = Snapshot(
-        time_s=0.0,
-        position_enu_m=(0.0,) * 3,
-        attitude=(1.0, 0.0, 0.0, 0.0),
-        mode=hostile,
-        battery=hostile,
-        texts=(hostile,),
-    )
+    place, level = (0.0,) * 3, (1.0, 0.0, 0.0, 0.0)
+    now = Snapshot(time_s=0.0, position_enu_m=place, attitude=level, mode=hostile, battery=hostile, texts=(hostile,))
     shown = words([hostile], [now])
     assert "<img" not in shown
     assert shown.count("</p>") == 1

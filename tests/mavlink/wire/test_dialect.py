@@ -17,6 +17,9 @@ def heartbeat(system_id: int = 7, component_id: int = 9) -> bytes:
     return Codec(system_id, component_id).encode("HEARTBEAT", *HEARTBEAT)
 
 
+UNKNOWN = heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]
+
+
 def packed(message: Any, *, old: bool = False) -> bytes:
     """Return a frame of pymavlink's."""
     return bytes(message.pack(common.MAVLink(None, srcSystem=7, srcComponent=9), force_mavlink1=old))
@@ -54,9 +57,7 @@ def test_a_truncated_frame_is_counted(length: int) -> None:
 
 def test_an_unknown_message_is_counted() -> None:
     codec = Codec(1, 1)
-    unknown_id = bytearray(heartbeat())
-    unknown_id[7:10] = b"\xff\xff\xff"
-    assert codec.decode(bytes(unknown_id)) == []
+    assert codec.decode(UNKNOWN) == []
     assert codec.dropped == {"unknown": 1}
 
 
@@ -197,9 +198,8 @@ def test_signed_frames_are_read_with_their_signature(beside: bytes) -> None:
 
 def test_an_unknown_message_is_kept_on_demand() -> None:
     codec = Codec(1, 1, keep_unknown=True)
-    unknown = heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]
-    kept, known = codec.decode(unknown + heartbeat())
-    assert (kept.name, kept.source, kept.fields, kept.frame) == (dialect.UNKNOWN, (7, 9), None, unknown)
+    kept, known = codec.decode(UNKNOWN + heartbeat())
+    assert (kept.name, kept.source, kept.fields, kept.frame) == (dialect.UNKNOWN, (7, 9), None, UNKNOWN)
     assert known.name == "HEARTBEAT"
     assert not codec.dropped
 
@@ -216,5 +216,5 @@ def test_what_a_frame_tells_without_being_decoded(old: bool) -> None:
 
 
 def test_nobody_can_tell_whether_an_unknown_message_is_intact() -> None:
-    assert dialect.intact(heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]) is None
+    assert dialect.intact(UNKNOWN) is None
     assert dialect.intact(sealed_heartbeat()) is True
