@@ -40,7 +40,8 @@ def thinned(table: dict[str, Any]) -> dict[str, Any]:
 class Flown:
     """A flight: PX4's topics, and of its tables the samples that these have."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *options: str) -> None:
+        assert main([*SPIRAL, *options, "--out", str(folder)]) == 0
         self.folder = folder
         self.log = ULog(str(folder / "flight.ulg"))
         assert not self.log.file_corruption
@@ -53,16 +54,12 @@ class Flown:
 
 @pytest.fixture(scope="module")
 def on_state(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    folder = tmp_path_factory.mktemp("state")
-    assert main([*SPIRAL, "--link", "memory", "--out", str(folder)]) == 0
-    return Flown(folder)
+    return Flown(tmp_path_factory.mktemp("state"), "--link", "memory")
 
 
 @pytest.fixture(scope="module")
 def on_sensors(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    folder = tmp_path_factory.mktemp("sensors")
-    assert main([*SPIRAL, "--link", "memory", "--feedback", "sensors", "--out", str(folder)]) == 0
-    return Flown(folder)
+    return Flown(tmp_path_factory.mktemp("sensors"), "--link", "memory", "--feedback", "sensors")
 
 
 @pytest.fixture(params=TOPICS)
@@ -153,7 +150,6 @@ def test_on_sensors_measurements_and_estimates_are_logged(on_sensors: Flown) -> 
 
 
 def test_two_processes_write_one_file_with_the_same_numbers(on_state: Flown, tmp_path: Path) -> None:
-    assert main([*SPIRAL, "--out", str(tmp_path)]) == 0
     flown = Flown(tmp_path)
     of_time = {"solve_time_us", "control_step_us"}
     for topic in on_state.log.data_list:

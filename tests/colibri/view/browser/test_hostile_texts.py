@@ -27,15 +27,9 @@ class Hostile:
         self.name = name
 
     def at(self, time_s: float) -> Snapshot:
-        upright = (1.0, 0.0, 0.0, 0.0)
-        return Snapshot(
-            time_s=time_s,
-            position_enu_m=(0.0,) * 3,
-            attitude=upright,
-            mode=HOSTILE[0],
-            battery=HOSTILE[1],
-            texts=HOSTILE,
-        )
+        mode, battery, *_ = HOSTILE
+        place, level = (0.0,) * 3, (1.0, 0.0, 0.0, 0.0)
+        return Snapshot(time_s=time_s, position_enu_m=place, attitude=level, mode=mode, battery=battery, texts=HOSTILE)
 
     def charts(self) -> tuple[Chart, ...]:
         times_s = np.arange(3.0)
