@@ -134,9 +134,10 @@ class ThreeRotors:
 
     def _watch_ground(self, state: VehicleState) -> None:
         sinks = self._climb_m_s(state) < 0.0
-        slow = hypot(*state.velocity_enu_m_s) < _STAYS_M_S
-        self._held_s = self._held_s + self._interval_s if sinks and slow else 0.0
         low = state.position_enu_m[2] - self._ground_m < _LAND_ABOVE_M
+        vx, vy, vz = state.velocity_enu_m_s
+        stays = abs(vz) < _STAYS_M_S if low else hypot(vx, vy, vz) < _STAYS_M_S  # on the ground it may slide
+        self._held_s = self._held_s + self._interval_s if sinks and stays else 0.0
         knocked = low and sinks and self._knock_m_s > _KNOCK * self._gravity * self._interval_s
         self.landed = self.landed or knocked or self._held_s >= _STAYS_S
 

@@ -133,3 +133,17 @@ def test_a_change_that_prevents_rotor_loss_landing_is_refused() -> None:
         rotor_loss.try_out(with_rotors(direction=("ccw", "ccw", "ccw", "cw")))
     rotor_loss.try_out(with_rotors(strength=(1.0, 0.9, 1.0, 1.0)))
     assert rotor_loss.lost is None
+
+
+@pytest.mark.parametrize(
+    ("height_m", "climb_m_s", "lands"),
+    [(0.4, 0.1, True), (0.4, -0.6, False), (5.0, 0.1, False)],
+    ids=["slides", "sinks", "drifts"],
+)
+def test_a_vehicle_that_slides_on_the_ground_has_landed(height_m: float, climb_m_s: float, lands: bool) -> None:
+    rotor_loss = RotorLoss(HUMMINGBIRD, 8000)
+    state = HOVER._replace(position_enu_m=(0.0, 0.0, height_m), velocity_enu_m_s=(2.0, 0.0, climb_m_s))
+    rotor_loss.resume(3, np.full(4, HUMMINGBIRD.hover_speed), state, 0.0, flying=True)
+    for _ in range(round(3.1 / INTERVAL_S)):  # 1.5 s until it sinks, and 1.5 s
+        rotor_loss.decide(state, 0.0)
+    assert rotor_loss.landed is lands
