@@ -205,7 +205,7 @@ class FuzzedVehicle:
     def prepare(self, state: State) -> None:
         flight, copter = self.flight, self.flight.copter
         copter.parameters.reset()
-        copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
+        copter.parameters.propose("MIS_TAKEOFF_ALT", 40.0)  # after the reset, which is proposed, too
         for plan in (FENCE, RALLY, MISSION):
             copter.stations.plans.load(plan, ())
         self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE)
