@@ -2,8 +2,8 @@
 
 Prints:
     lost: None
-    position error, RMS after 20 s: 0.370 m
-    hash of the trajectory: 2fbcf5c2fd37b99c
+    position error, RMS after 20 s: 0.369 m
+    hash of the trajectory: 8429965dc6357f57
 """
 
 import colibri
