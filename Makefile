@@ -117,10 +117,19 @@ kills: setup
 golden: setup
 	$(BIN)/python -m tools.golden $(GOLDEN)
 
-# The same under every other Python from 3.11 on that there is, each in .venv-3.N from the lock; `make test-long` flies
-# them in those, too, once they are there.
+# The same under every other Python from 3.11 on that there is (with pyenv: PYENV_VERSION=3.12.1:3.13.0), each in
+# .venv-3.N from the lock; `make test-long` flies them in those, too, once they are there.
 verify-pythons: setup
+	@for python in python3.{11..19}; do test -e $(BIN)/$$python || ! $$python -c 0 2>/dev/null || \
+	  $(MAKE) --no-print-directory .venv-$${python#python}/.ready || exit; done
 	$(BIN)/python -m tools.golden --pythons $(GOLDEN)
+
+.venv-3.%/.ready: requirements.lock pyproject.toml
+	@echo "setting up .venv-3.$* from requirements.lock"
+	@python3.$* -m venv --clear .venv-3.$*
+	@.venv-3.$*/bin/python $(PIP) --quiet --require-hashes -r requirements.lock
+	@.venv-3.$*/bin/python $(PIP) --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
 
 # A flight with the lowest and with the newest versions that pyproject.toml allows, each in an environment of its own.
 # Needs uv; BOUNDS=lowest-direct tries one.

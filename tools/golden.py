@@ -4,7 +4,6 @@ import argparse
 import json
 import os
 import platform
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -19,12 +18,11 @@ import numpy as np
 
 from colibri.analysis.tables import markdown
 from colibri.common.process.arguments import chosen
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
+from colibri.common.process.lifecycle import EXIT_FAILED, fail_interrupted
 from colibri.verification.verify import FOUND
 
 MIN_MINOR, MAX_MINOR = 11, 19  # minor versions of Python 3 to look for
 _MADE_FROM = ("requirements.lock", "pyproject.toml")  # an environment older than these is stale
-_SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 
 def environments(root: Path) -> dict[str, Path]:
@@ -36,52 +34,9 @@ def environments(root: Path) -> dict[str, Path]:
     return found
 
 
-def other_pythons() -> dict[str, Path]:
-    found = {}
-    for minor in range(MIN_MINOR, MAX_MINOR + 1):
-        for python in _candidates(minor):
-            if minor != sys.version_info.minor and _version(python) == f"3.{minor}":
-                found[f"3.{minor}"] = python
-                break
-    return found
-
-
 def is_stale(root: Path, version: str) -> bool:
     ready = root / f".venv-{version}" / ".ready"
     return not ready.exists() or ready.stat().st_mtime <= max((root / name).stat().st_mtime for name in _MADE_FROM)
-
-
-def set_up(root: Path, version: str, python: Path) -> None:
-    if not is_stale(root, version):
-        return
-    folder = root / f".venv-{version}"
-    pip = (str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    for command in (
-        (str(python), "-m", "venv", "--clear", str(folder)),
-        (*pip, "--require-hashes", "-r", str(root / "requirements.lock")),
-        (*pip, "--no-deps", "--no-build-isolation", "--editable", str(root)),
-    ):
-        subprocess.run(command, check=True, capture_output=True, text=True, cwd=root)
-    (folder / ".ready").touch()
-
-
-def _candidates(minor: int) -> list[Path]:
-    kept = Path.home() / ".pyenv" / "versions"
-    pyenv = sorted(kept.glob(f"3.{minor}.*"), key=lambda folder: [_number(part) for part in folder.name.split(".")])
-    on_path = shutil.which(f"python3.{minor}")
-    return [*(folder / "bin" / "python" for folder in reversed(pyenv)), *([Path(on_path)] if on_path else [])]
-
-
-def _number(part: str) -> int:
-    return int(part) if part.isdigit() else -1
-
-
-def _version(python: Path) -> str:
-    try:
-        said = subprocess.run([str(python), "-c", _SAYS_VERSION], capture_output=True, text=True, check=False)
-    except OSError:
-        return ""
-    return said.stdout.strip()
 
 
 ROOT = Path(__file__).parents[1]
@@ -202,8 +157,6 @@ def _environment(variation: Variation) -> dict[str, str]:
 def main(argv: Sequence[str] | None = None) -> int:
     args = _arguments(argv)
     try:
-        if args.pythons:
-            _set_up_pythons()
         return _fly_all(_wanted(args), args)
     except KeyboardInterrupt as ended:
         fail_interrupted(ended)
@@ -250,24 +203,12 @@ def _wanted(args: argparse.Namespace) -> list[Variation]:
     return [each for each in known.values() if each.name.startswith("python-")] if args.pythons else wanted
 
 
-def _set_up_pythons() -> None:
-    for version, python in other_pythons().items():
-        print(f"Python {version}: {python}, in .venv-{version} from requirements.lock", flush=True)
-        try:
-            set_up(ROOT, version, python)
-        except subprocess.CalledProcessError as error:
-            words = (error.stderr or "").strip().splitlines()
-            fail(f"cannot set up .venv-{version}: {words[-1] if words else error}", EXIT_FAILED)
-
-
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tools.golden", description=__doc__)
     parser.add_argument("--link", default="memory", choices=("memory", "udp"), help="(default %(default)s)")
     parser.add_argument("--only", action="append", default=[], metavar="FLIGHT", help="only this; may be repeated")
     parser.add_argument("--variation", action="append", default=[], metavar="NAME", help="only this; may be repeated")
-    parser.add_argument(
-        "--pythons", action="store_true", help="set up each other Python in .venv-3.N, and fly under them"
-    )
+    parser.add_argument("--pythons", action="store_true", help="only those of other Pythons, in .venv-3.N")
     parser.add_argument("--table", type=Path, metavar="FILE", help="write flights × variations there, as Markdown")
     return parser.parse_args(argv)
 
