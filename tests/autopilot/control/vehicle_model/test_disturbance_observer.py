@@ -57,7 +57,7 @@ def test_no_more_is_estimated_than_the_limit() -> None:
     assert estimate[9] == pytest.approx(1e-3)
 
 
-def test_near_the_ground_only_small_lifts_and_moments_are_learned() -> None:
+def test_near_the_ground_only_small_disturbances_are_learned() -> None:
     found, before = np.array([*range(6), 3.0, -3.0, 3.0, 0.25, -0.25, 0.25]), np.zeros(ESTIMATES)
     before[11] = 0.2
     estimate = found.copy()
