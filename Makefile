@@ -113,7 +113,7 @@ kills: setup
 	$(BIN)/python -m tools.kills --kills 200 --of plant
 
 # The golden flights as on other computers: other kernels of OpenBLAS, numpy, numba and glibc; which flight differs, and
-# how long each took. GOLDEN="--link udp --table FILE", say.
+# how long each took. GOLDEN="--link udp", say.
 golden: setup
 	$(BIN)/python -m tools.golden $(GOLDEN)
 

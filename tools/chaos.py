@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import sys
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -12,7 +12,6 @@ from math import hypot, inf
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from colibri.analysis.tables import markdown
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.feedback import Feedback
@@ -245,26 +244,12 @@ def main() -> int:
         cases.append(case)
         if case["bad"]:
             print(f"FAILED: {case}", flush=True)
-    print(table(cases))
-    flown = sum(case["outcome"] != "not reached" for case in cases)
+    outcomes = Counter(case["outcome"] for case in cases)
+    print(", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common()))
+    flown = len(cases) - outcomes["not reached"]
     failed = sum(case["bad"] for case in cases)
     print(f"{flown} flights with exceptions thrown, {failed} failed; {perf_counter() - started_s:.0f} s")
     return 1 if failed or not flown else 0
-
-
-def table(cases: list[dict[str, Any]]) -> str:
-    outcomes: dict[str, dict[str, Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
-    said: dict[str, Counter[str]] = defaultdict(Counter)
-    for case in cases:
-        if case["outcome"] != "not reached":
-            outcomes[case["place"]][case["situation"]][case["outcome"]] += 1
-            said[case["place"]][case["said"]] += 1
-    rows = []
-    for place, row in outcomes.items():
-        cells = (", ".join(f"{n} {what}" for what, n in sorted(row[name].items())) or "–" for name in SITUATIONS)
-        ((text, _),) = said[place].most_common(1)
-        rows.append((f"`{place.partition(':')[2]}`", *cells, text))
-    return markdown(("place", *SITUATIONS, "said"), rows, names=len(SITUATIONS) + 2)
 
 
 def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:

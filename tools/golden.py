@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.analysis.tables import markdown
 from colibri.common.process.arguments import chosen
 from colibri.common.process.lifecycle import EXIT_FAILED, fail_interrupted
 from colibri.verification.verify import FOUND
@@ -162,17 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail_interrupted(ended)
 
 
-def table(flown: Mapping[str, GoldenHashes]) -> str:
-    names = list(flown)
-    flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
-    differing = {name: each.differing() for name, each in flown.items()}
-    rows = [(flight, *("**differs**" if flight in differing[name] else "=" for name in names)) for flight in flights]
-    rows.append(("took", *(f"{each.took_s:.0f} s" for each in flown.values())))
-    return markdown(("flight", *names), rows, names=1 + len(names))
-
-
 def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
-    flown: dict[str, GoldenHashes] = {}
     failed = False
     for variation in wanted:
         obstacle = variation.obstacle()
@@ -181,7 +170,7 @@ def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
             continue
         with TemporaryDirectory(prefix="golden-") as out:
             try:
-                flown[variation.name] = done = fly(variation, Path(out), args.link, args.only)
+                done = fly(variation, Path(out), args.link, args.only)
             except VariationError as error:
                 print(f"FAILED: {error}", flush=True)
                 failed = True
@@ -192,8 +181,6 @@ def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
         for flight, (expected, found) in differing.items():
             print(f"  {flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}")
         sys.stdout.flush()
-    if args.table:
-        args.table.write_text(table(flown), encoding="utf-8")
     return EXIT_FAILED if failed else 0
 
 
@@ -209,7 +196,6 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--only", action="append", default=[], metavar="FLIGHT", help="only this; may be repeated")
     parser.add_argument("--variation", action="append", default=[], metavar="NAME", help="only this; may be repeated")
     parser.add_argument("--pythons", action="store_true", help="only those of other Pythons, in .venv-3.N")
-    parser.add_argument("--table", type=Path, metavar="FILE", help="write flights × variations there, as Markdown")
     return parser.parse_args(argv)
 
 

@@ -5,7 +5,7 @@ import sys
 
 from colibri.campaigns.engines import in_order
 from colibri.common.process.arguments import seeds
-from tools.fuzz.campaign import HEADER, Job, fire
+from tools.fuzz.campaign import Job, fire
 
 
 def main() -> int:
@@ -17,8 +17,7 @@ def main() -> int:
     args = parser.parse_args()
     jobs = [Job(seed, args.datagrams, 0) for seed in args.seeds[: args.lockstep]]
     jobs += [Job(seed, 0, args.messages) for seed in args.seeds]
-    print(HEADER, flush=True)
-    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda each: print(*each[0], sep="\n", flush=True))
+    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda each: print(each[0], flush=True))
     failures = [failure for _, found in results for failure in found]
     print(*[f"FAILED: {failure}" for failure in failures] or [f"{len(jobs)} campaigns, and nothing failed"], sep="\n")
     return 1 if failures else 0

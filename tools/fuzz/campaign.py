@@ -173,7 +173,6 @@ def _kernel_drops(processes: dict[str, Process]) -> int:
 
 
 BURST = 60
-HEADER = f"{'fired at':<16}{'seed':>6}{'sent':>10}{'MiB before':>12}{'after':>9}{'s':>7}  reached"
 
 
 class Job(NamedTuple):
@@ -184,36 +183,30 @@ class Job(NamedTuple):
     messages: int  # from ground stations
 
 
-_Fired: TypeAlias = tuple[str, int, tuple[float, float], str]
-"""Target, number of datagrams or messages, memory in MiB before and after, and what was reached."""
+_Reached: TypeAlias = tuple[str, list[tuple[float, float]], list[str]]
+"""What was reached, memory in MiB before and after of each process, and failures."""
 
 
-def fire(job: Job) -> tuple[list[str], list[str]]:
-    """Return lines of the table, and failures."""
+def fire(job: Job) -> tuple[str, list[str]]:
+    """Return what was reached, and failures."""
     began_s = perf_counter()
     whom, run = ("lockstep", _lockstep) if job.datagrams else ("ground stations", _ground)
     with tempfile.TemporaryDirectory() as name:
-        rows, failures = run(job, Path(name))
-    took_s = perf_counter() - began_s
-    lines = [
-        f"{target:<16}{job.seed:>6}{sent:>10}{before:>12.2f}{after:>9.2f}{took_s:>7.0f}  "
-        f"{'FAILED' if failures else reached}"
-        for target, sent, (before, after), reached in rows
-    ]
-    return lines, [f"seed {job.seed}, {whom}: {failure}" for failure in failures]
+        reached, memory_mib, failures = run(job, Path(name))
+    grown = ", ".join(f"{before:.2f} to {after:.2f} MiB" for before, after in memory_mib)
+    said = f"seed {job.seed}, {whom}: {'FAILED' if failures else reached}, {grown}, {perf_counter() - began_s:.0f} s"
+    return said, [f"seed {job.seed}, {whom}: {failure}" for failure in failures]
 
 
-def _lockstep(job: Job, folder: Path) -> tuple[list[_Fired], list[str]]:
+def _lockstep(job: Job, folder: Path) -> _Reached:
     outcome = campaign(folder, job.datagrams, burst=BURST, seed=job.seed)
     failures = outcome.failures + [f"{outcome.lost} datagrams never arrived"] * (outcome.lost > 0)
-    sent = {name: sum(n for (whom, _), n in outcome.sent.items() if whom == name) for name in outcome.memory_mib}
-    reached = "the flight is unchanged"
-    return [(name, sent[name], memory, reached) for name, memory in outcome.memory_mib.items()], failures
+    return f"{sum(outcome.sent.values())} sent, the flight is unchanged", [*outcome.memory_mib.values()], failures
 
 
-def _ground(job: Job, path: Path) -> tuple[list[_Fired], list[str]]:
+def _ground(job: Job, path: Path) -> _Reached:
     with closing(Folder(path)) as folder:
         outcome = ground_campaign(job.messages, seed=job.seed, files=folder)
-    accepted = f"{outcome.accepted} commands of {outcome.kinds} kinds accepted"
+    accepted = f"{sum(outcome.sent.values())} sent, {outcome.accepted} commands of {outcome.kinds} kinds accepted"
     reached = f"{accepted}, {len(outcome.sent)} states met, {outcome.flown_s:.0f} s flown"
-    return [("ground stations", sum(outcome.sent.values()), outcome.memory_mib, reached)], outcome.failures
+    return reached, [outcome.memory_mib], outcome.failures

@@ -1,7 +1,6 @@
 """`make soak-clients`: two ground stations and a companion on one vehicle."""
 
 import argparse
-import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -190,7 +189,8 @@ def without_battery(folder: Path) -> Path:
     return path
 
 
-def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
+def soak(duration_s: float) -> tuple[list[str], list[str]]:
+    """Return what was measured, and what is wrong."""
     clients = crew()
     with TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
@@ -198,56 +198,40 @@ def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
         tireless = ("--vehicle", str(without_battery(folder)))
         flown = stack.enter_context(vehicle(folder, *tireless, links=links))
         processes = {child.cmdline()[3]: child for child in psutil.Process(flown.process.pid).children()}
-        looks: list[Look] = []
-        began_s = monotonic()
-        while monotonic() < began_s + duration_s and flown.process.poll() is None:
-            sleep(LOOK_EVERY_S)
+
+        def look() -> Look:
             resident = {name: process.memory_info().rss for name, process in processes.items()}
             cpu_s = {name: sum(process.cpu_times()[:2]) for name, process in processes.items()}
-            looks.append(Look(monotonic() - began_s, clients[0].time_s, resident, cpu_s))
+            return Look(monotonic(), clients[0].time_s, resident, cpu_s)
+
+        began_s = monotonic()
+        sleep(min(WARM_UP_S, 0.5 * duration_s))
+        warm = last = look()
+        while last is warm or (last.wall_s < began_s + duration_s and flown.process.poll() is None):
+            sleep(LOOK_EVERY_S)
+            last = look()
         ended = flown.process.poll()
-    warm = next(look for look in looks if look.wall_s >= min(WARM_UP_S, 0.5 * duration_s))
-    figures = _figures(clients, looks, warm)
-    wrong = faults(clients) + ([] if ended is None else [f"the vehicle ended with exit code {ended}"])
-    for name, growth in figures["growth_bytes"].items():
-        if growth > MAX_GROWTH_BYTES:
-            wrong.append(f"{name} grew by {growth} bytes")
-    return figures, wrong
-
-
-def _figures(clients: Sequence[HarnessStation], looks: Sequence[Look], warm: Look) -> dict[str, Any]:
-    last = looks[-1]
     lasted_s = last.wall_s - warm.wall_s
-    return {
-        "wall_s": last.wall_s,
-        "times_real_time": (last.sim_s - warm.sim_s) / lasted_s,
-        "resident_bytes": last.resident_bytes,
-        "growth_bytes": {name: last.resident_bytes[name] - warm.resident_bytes[name] for name in last.resident_bytes},
-        "cpu_share": {name: (last.cpu_s[name] - warm.cpu_s[name]) / lasted_s for name in last.cpu_s},
-        "clients": {
-            f"{client.identity[0]}/{client.identity[1]}": {
-                "max_gap_s": client.max_gap_s,
-                "commands": sum(client.sent.values()),
-                "acks": sum(client.acks.values()),
-                "messages": sum(client.counts.values()),
-            }
-            for client in clients
-        },
-        "off_m": max(client.off_m for client in clients if isinstance(client, CirclingCompanion)),
-        "looks": looks,
-    }
+    said = [f"{(last.sim_s - warm.sim_s) / lasted_s:.3f} times real time for {lasted_s:.0f} s"]
+    wrong = faults(clients) + ([] if ended is None else [f"the vehicle ended with exit code {ended}"])
+    for process, resident in last.resident_bytes.items():
+        growth, cpu_s = resident - warm.resident_bytes[process], last.cpu_s[process] - warm.cpu_s[process]
+        said.append(f"{process}: {resident} bytes, grown by {growth}, {100 * cpu_s / lasted_s:.0f} % of a core")
+        wrong += [f"{process} grew by {growth} bytes"] * (growth > MAX_GROWTH_BYTES)
+    for client in clients:
+        counts = f"{sum(client.acks.values())} of {sum(client.sent.values())} commands acknowledged"
+        heard = f"{sum(client.counts.values())} messages, longest gap {client.max_gap_s:.2f} s"
+        off = f", {client.off_m:.2f} m off its circle" if isinstance(client, CirclingCompanion) else ""
+        said.append(f"{client.identity[0]}/{client.identity[1]}: {counts}, {heard}{off}")
+    return said, wrong
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.soak.clients", description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--out", type=Path, help="write all figures as JSON there")
     args = parser.parse_args()
-    figures, wrong = soak(60.0 * args.minutes)
-    if args.out:
-        args.out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
-    figures.pop("looks")
-    print(json.dumps(figures, indent=1), *wrong, sep="\n")
+    said, wrong = soak(60.0 * args.minutes)
+    print(*said, *(f"FAILED: {fault}" for fault in wrong), sep="\n")
     return 1 if wrong else 0
 
 
