@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_options(parser)
     args = parser.parse_args(argv)
     use_one_thread()
-    peer = PeerSimulator("rotorpy", real_time_factor) if installed() else None
+    peer = PeerSimulator("rotorpy", real_time_factor) if find_spec("rotorpy") else None
     if peer is None and "flights" in (args.only or ["flights"]):
         sys.stderr.write(f"colibri: {MISSING}\n")
     try:
@@ -29,10 +29,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 MISSING = "RotorPy is not installed: pip install 'colibri-sitl[bench]' brings it; going on without"
-
-
-def installed() -> bool:
-    return find_spec("rotorpy") is not None
 
 
 def real_time_factor(frames_hz: int, duration_s: float) -> float:

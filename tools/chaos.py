@@ -115,16 +115,13 @@ MAX_IMPACT_M_S = 3.5
 _WATCH_S, _LAND_WITHIN_S = 2.5, 30.0
 _NEAR_GROUND_M = 0.15
 _LOST_M = 60.0
+_HOLDS = ("flown on", "landed", "not reached")
 
 
 class ChaosOutcome(NamedTuple):
-    outcome: str  # "flown on", "landed", "not reached", or the violated condition
+    outcome: str  # of `_HOLDS`, or the violated condition
     thrown: int  # number of exceptions
     said: str  # the first STATUSTEXT about them
-
-    @property
-    def holds(self) -> bool:
-        return self.outcome in ("flown on", "landed", "not reached")
 
 
 @contextmanager
@@ -300,7 +297,7 @@ def _fly(flight: Sitl, place: str, times: float, case: dict[str, Any], out: int)
     if pid == 0:
         verdict = ChaosFlight(flight, case["situation"], Thrower(place, times)).judged()
         facts = {**case, "place": place, "goes_on": times > 1.0, "at_s": round(flight.time_s, 3), **verdict._asdict()}
-        os.write(out, (json.dumps({**facts, "bad": not verdict.holds}) + "\n").encode())
+        os.write(out, (json.dumps({**facts, "bad": verdict.outcome not in _HOLDS}) + "\n").encode())
         os._exit(0)
     _wait(pid)
 

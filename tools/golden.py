@@ -20,22 +20,17 @@ from colibri.common.process.arguments import chosen
 from colibri.common.process.lifecycle import EXIT_FAILED, fail_interrupted
 from colibri.verification.verify import FOUND
 
-MIN_MINOR, MAX_MINOR = 11, 19  # minor versions of Python 3 to look for
 _MADE_FROM = ("requirements.lock", "pyproject.toml")  # an environment older than these is stale
 
 
 def environments(root: Path) -> dict[str, Path]:
-    found = {}
-    for minor in range(MIN_MINOR, MAX_MINOR + 1):
-        folder = root / f".venv-3.{minor}"
-        if (folder / ".ready").exists():
-            found[f"3.{minor}"] = folder / "bin" / "python"
-    return found
+    """Return .venv-3.N by version."""
+    return {ready.parent.name.removeprefix(".venv-"): ready.parent for ready in sorted(root.glob(".venv-3.*/.ready"))}
 
 
-def is_stale(root: Path, version: str) -> bool:
-    ready = root / f".venv-{version}" / ".ready"
-    return not ready.exists() or ready.stat().st_mtime <= max((root / name).stat().st_mtime for name in _MADE_FROM)
+def is_stale(root: Path, environment: Path) -> bool:
+    made = (environment / ".ready").stat().st_mtime
+    return made <= max((root / name).stat().st_mtime for name in _MADE_FROM)
 
 
 ROOT = Path(__file__).parents[1]
@@ -94,8 +89,12 @@ def variations() -> list[Variation]:
         ),
         Variation(name="two-threads", environment=dict.fromkeys(ONE_THREAD, "2")),
         *(
-            Variation(name=f"python-{version}", python=python, lacks=_STALE.format(version) * is_stale(ROOT, version))
-            for version, python in environments(ROOT).items()
+            Variation(
+                name=f"python-{version}",
+                python=folder / "bin" / "python",
+                lacks=_STALE.format(version) * is_stale(ROOT, folder),
+            )
+            for version, folder in environments(ROOT).items()
         ),
     ]
 
@@ -154,14 +153,23 @@ def _environment(variation: Variation) -> dict[str, str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    args = _arguments(argv)
+    parser = argparse.ArgumentParser(prog="python -m tools.golden", description=__doc__)
+    parser.add_argument("--link", default="memory", choices=("memory", "udp"), help="(default %(default)s)")
+    parser.add_argument("--only", action="append", default=[], metavar="FLIGHT", help="only this; may be repeated")
+    parser.add_argument("--variation", action="append", default=[], metavar="NAME", help="only this; may be repeated")
+    parser.add_argument("--pythons", action="store_true", help="only those of other Pythons, in .venv-3.N")
+    args = parser.parse_args(argv)
+    known = {variation.name: variation for variation in variations()}
+    wanted = chosen("variation", args.variation, known, "--variation: ")
+    if args.pythons:
+        wanted = [each for each in wanted if each.name.startswith("python-")]
     try:
-        return _fly_all(_wanted(args), args)
+        return _fly_all(wanted, args.link, args.only)
     except KeyboardInterrupt as ended:
         fail_interrupted(ended)
 
 
-def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
+def _fly_all(wanted: Sequence[Variation], link: str, only: Sequence[str]) -> int:
     failed = False
     for variation in wanted:
         obstacle = variation.obstacle()
@@ -170,7 +178,7 @@ def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
             continue
         with TemporaryDirectory(prefix="golden-") as out:
             try:
-                done = fly(variation, Path(out), args.link, args.only)
+                done = fly(variation, Path(out), link, only)
             except VariationError as error:
                 print(f"FAILED: {error}", flush=True)
                 failed = True
@@ -182,21 +190,6 @@ def _fly_all(wanted: Sequence[Variation], args: argparse.Namespace) -> int:
             print(f"  {flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}")
         sys.stdout.flush()
     return EXIT_FAILED if failed else 0
-
-
-def _wanted(args: argparse.Namespace) -> list[Variation]:
-    known = {variation.name: variation for variation in variations()}
-    wanted = chosen("variation", args.variation, known, "--variation: ")
-    return [each for each in known.values() if each.name.startswith("python-")] if args.pythons else wanted
-
-
-def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m tools.golden", description=__doc__)
-    parser.add_argument("--link", default="memory", choices=("memory", "udp"), help="(default %(default)s)")
-    parser.add_argument("--only", action="append", default=[], metavar="FLIGHT", help="only this; may be repeated")
-    parser.add_argument("--variation", action="append", default=[], metavar="NAME", help="only this; may be repeated")
-    parser.add_argument("--pythons", action="store_true", help="only those of other Pythons, in .venv-3.N")
-    return parser.parse_args(argv)
 
 
 if __name__ == "__main__":

@@ -63,10 +63,6 @@ class RandomFlight(NamedTuple):
     events: list[RandomEvent]
 
     @property
-    def well(self) -> bool:
-        return all(event.what not in ("inject", "silence") for event in self.events)
-
-    @property
     def lands(self) -> bool:
         """Whether it should land: at most one sensor fails, and no parameter asks to fall."""
         if self.may_fall:
@@ -201,7 +197,8 @@ class _JudgedFlight:
         _try(lambda: flight.upload_mission(items.waypoint(east, north, case.height_m) for east, north in plan))
         if not _try(lambda: flight.takeoff(case.height_m, wait=False)):
             return ""
-        self._keeps_fence = case.well and flight.get_param("GF_ACTION") not in (0, 1)
+        is_well = all(event.what not in ("inject", "silence") for event in case.events)
+        self._keeps_fence = is_well and flight.get_param("GF_ACTION") not in (0, 1)
         self._braking_m_s2 = flight.get_param("MPC_ACC_HOR")
         self._reaction_s = 0.5 + self._braking_m_s2 / flight.get_param("MPC_JERK_MAX")
         for event in case.events:

@@ -1,6 +1,7 @@
 """`make bench`: flights beside RotorPy's, and what is said where there is none."""
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def flights_of(out: Path) -> dict[str, Any]:
 def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(rotorpy_peer, "installed", lambda: False)
+    monkeypatch.setattr(rotorpy_peer, "find_spec", lambda _: None)
     monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
     flights = flights_of(tmp_path / "flights.json")
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
@@ -28,6 +29,6 @@ def test_a_missing_peer_is_said_in_one_line(
     assert "colibri-sitl[bench]" in rotorpy_peer.MISSING
 
 
-@pytest.mark.skipif(not rotorpy_peer.installed(), reason="needs RotorPy, which the lock leaves out")
+@pytest.mark.skipif(not find_spec("rotorpy"), reason="needs RotorPy, which the lock leaves out")
 def test_the_peer_flies() -> None:
     assert rotorpy_peer.real_time_factor(100, 0.2) > 0.0
