@@ -19,6 +19,7 @@ _UNCARRIED_STILL_S, _FALLS_M_S2 = 0.2, 4.0
 """The same where the climb rate falls by less than this per second of weight: in the air by more than 9."""
 _JUMP_M_S = 1.0  # change of the climb rate in a sample that no force causes: a corrected estimate, or the ground
 SUSPECTED_S = 0.1  # lack of lift from which on a failed sensor may take the ground for a motion
+_HELD_M, _HELD_US = 0.3, 5_000_000
 _CLEAR_M = 0.3
 HARD_M_S, HARD_UP = 3.0, 0.5  # speed, and cosine of the tilt, beyond which a contact is an impact
 HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its contact
@@ -83,6 +84,23 @@ class Lack(NamedTuple):
         """Whether the ground carries the vehicle: it lacks lift for long, or less long and neither falls nor climbs."""
         moves = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s or climb_m_s > _JUMP_M_S
         return self.lack_s >= (_UNCARRIED_S if moves else _UNCARRIED_STILL_S)
+
+
+class Held(NamedTuple):
+    """Start of a time without change of height though the reference is far below, and the height."""
+
+    since_us: int | None = None
+    height_m: float = 0.0
+
+    def after(self, now_us: int, wanted_m: float, state: VehicleState) -> "Held":
+        z = state.position_enu_m[2]
+        if not is_far_below(wanted_m, state):
+            return Held()
+        return Held(now_us, z) if self.since_us is None or abs(z - self.height_m) > _HELD_M else self
+
+    def is_long(self, now_us: int) -> bool:
+        """Whether only the ground can hold the vehicle, even if it rocks on an edge."""
+        return self.since_us is not None and now_us - self.since_us >= _HELD_US
 
 
 class Motion(NamedTuple):

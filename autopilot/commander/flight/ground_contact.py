@@ -11,6 +11,7 @@ from colibri.autopilot.guidance.landing_detector import (
     KNOCK_SAMPLES,
     SUSPECTED_S,
     Hardest,
+    Held,
     Lack,
     Landing,
     Motion,
@@ -54,7 +55,7 @@ class GroundContact:
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self._landing = Landing()
-        self._lack, self._hardest = Lack(), Hardest()
+        self._lack, self._hardest, self._held = Lack(), Hardest(), Held()
         self._motions: deque[Motion] = deque(maxlen=KNOCK_SAMPLES)
         self.impact = ""
         self.drifts = False
@@ -89,7 +90,7 @@ class GroundContact:
 
     def take_off(self, now_us: int) -> None:
         self.standing = False
-        self._landing, self._lack, self._hardest = Landing(), Lack(), Hardest()
+        self._landing, self._lack, self._hardest, self._held = Landing(), Lack(), Hardest(), Held()
         self._motions.clear()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "Takeoff detected")
@@ -117,7 +118,8 @@ class GroundContact:
         self._landing, stands = watch(
             self._landing, now_us, vehicle, sinks or fell, drifts=drifts, slides=is_far_below(wanted_m, vehicle)
         )
-        if stands:
+        self._held = self._held.after(now_us, wanted_m, vehicle)
+        if stands or self._held.is_long(now_us):
             self.land(now_us)
         return stands and fell
 

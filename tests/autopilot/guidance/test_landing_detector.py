@@ -3,7 +3,7 @@
 import pytest
 
 from colibri.autopilot.control.interface import AT_REST
-from colibri.autopilot.guidance.landing_detector import Lack, is_touching
+from colibri.autopilot.guidance.landing_detector import Held, Lack, is_touching
 
 _INTERVAL_S = 0.01
 
@@ -35,3 +35,14 @@ def test_ground_carries_what_lacks_lift(
 def test_feet_push_near_the_ground_only(push: float, height_m: float, touches: bool) -> None:
     state = AT_REST._replace(position_enu_m=(0.0, 0.0, height_m))
     assert is_touching(push, state, 0.0) is touches
+
+
+@pytest.mark.parametrize(
+    ("wanted_m", "climb_m_s", "holds"), [(-5.0, 0.0, True), (-0.5, 0.0, False), (-5.0, -0.2, False)]
+)
+def test_a_vehicle_that_rocks_above_a_sinking_reference_stands(wanted_m: float, climb_m_s: float, holds: bool) -> None:
+    held = Held()
+    for sample in range(520):
+        rocks_m = 0.1 * (sample % 3) + climb_m_s * sample * _INTERVAL_S
+        held = held.after(sample * 10_000, wanted_m, AT_REST._replace(position_enu_m=(0.0, 0.0, rocks_m)))
+    assert held.is_long(5_200_000) is holds
