@@ -222,6 +222,7 @@ def _program(port: int) -> str:
 
 
 _EVERY_S = 1.0
+_STATIONS: Sequence[int] = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER)
 
 
 def ground_station(link: GroundLink, within_s: float) -> Finding:
@@ -246,17 +247,11 @@ def called(link: GroundLink, within_s: float) -> str | None:
         link.wait(min(beat_at_s, began_s + within_s) - now_s)
         for datagram, (host, port) in link.receive_now():
             stations.add((host, port))
-            system = _station(codec, datagram)
-            if system is not None:
-                return f"system {system} at {host}:{port} answers"
+            for it in codec.decode(datagram):
+                if it.name == "HEARTBEAT" and it.fields.type in _STATIONS:
+                    return f"system {it.source[0]} at {host}:{port} answers"
         now_s = perf_counter()
     return None
-
-
-def _station(codec: Codec, datagram: bytes) -> int | None:
-    kinds: Sequence[int] = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER)
-    beats = (it for it in codec.decode(datagram) if it.name == "HEARTBEAT" and it.fields.type in kinds)
-    return next((it.source[0] for it in beats), None)
 
 
 Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]

@@ -90,7 +90,10 @@ class GroundService:
         self._reported_us = 0
         self._sources: set[tuple[str, str]] = set()
         for number, link in enumerate(links):
-            self._status.say("ground", _invitation(link.url), url=link.url, link=number)
+            scheme, _, rest = link.url.partition(":")
+            calls = scheme in ("udpout", "tcp", "serial")
+            does = "connects to ground stations at" if calls else "waits for ground stations on"
+            self._status.say("ground", f"{does} {rest} ({scheme})", url=link.url, link=number)
 
     def record(self, log: "AutopilotLog") -> None:
         self._log = log
@@ -290,12 +293,6 @@ class GroundService:
             "times_real_time": (now_us - self._reported_us) * 1e-6 / (now_s - self._reported_s),
             "solve_time_us": self.copter.parts.actuation.solve_time_s * 1e6,
         }
-
-
-def _invitation(url: str) -> str:
-    scheme, _, rest = url.partition(":")
-    does = "connects to ground stations at" if scheme in ("udpout", "tcp", "serial") else "waits for ground stations on"
-    return f"{does} {rest} ({scheme})"
 
 
 def _noting(received: Iterable[Received], datagrams: list[bytes]) -> Iterator[Received]:

@@ -117,7 +117,9 @@ class FlightReader:
             raise RecordingError("the flight ended before it began")
         lags = read_lags(self.log)
         lags = lags.first(int(np.searchsorted(lags.decided_s, plant_s[-1])))
-        self._sampled = _at_samples(plant_s, lags.decided_s)
+        decided_s = lags.decided_s  # of each control sample; the last one is held as long as the first
+        held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant_s[-1])
+        self._sampled = at_times(plant_s, np.concatenate([decided_s, held_s]))
         self.samples = int(np.count_nonzero(self._sampled))
         self._lags = lags.first(max(self.samples - 1, 0))
         if not len(self._lags.decided_s):
@@ -212,12 +214,6 @@ class TableWriter:
 
     def add(self, part: Samples) -> None:
         self._file.write(csv_rows(part.table))
-
-
-def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:
-    """Mask the plant's rows at control samples and at the last one's end."""
-    held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant_s[-1])
-    return at_times(plant_s, np.concatenate([decided_s, held_s]))
 
 
 def _inputs(vehicle: Vehicle, rotors: Array) -> Array:

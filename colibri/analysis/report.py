@@ -43,6 +43,9 @@ def report(
     begin_s, end_s = plan.spec.window or (inf, inf)
     within = error[(t >= begin_s - _INSTANT_S) & (t <= end_s + _INSTANT_S)]
     settled = error[t >= SETTLED_AFTER_S]
+    estimation: Report = dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
+    if plan.spec.feedback is Feedback.SENSORS:
+        estimation = read_estimation(plan, log, SETTLED_AFTER_S).figures()
     return {
         "track": str(plan.spec.track),
         "track_note": plan.track_note,
@@ -80,7 +83,7 @@ def report(
         "mean_error_in_window_m": float(within.mean()) if len(within) else None,
         "rmse_in_window_m": rms(within) if len(within) else None,
         "max_error_in_window_m": float(within.max()) if len(within) else None,
-        **_estimation_figures(plan, log, settled),
+        **estimation,
         "max_tilt_deg": degrees(acos(max(-1.0, min(1.0, float(flight.upright.min()))))),
         "effort_n_m": rms(flight.moment_n_m),
         "solve_time_us": _quantiles(flight.solve_time_us),
@@ -97,12 +100,6 @@ def report(
         "path_lag_s": flight.path_lag_s,
         "trajectory_sha256": flight.trajectory_sha256,
     }
-
-
-def _estimation_figures(plan: FlightPlan, log: TopicReader, settled: Array) -> Report:
-    if plan.spec.feedback is Feedback.SENSORS:
-        return read_estimation(plan, log, SETTLED_AFTER_S).figures()
-    return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
 
 
 def encoded_report(figures: Report) -> bytes:

@@ -95,7 +95,9 @@ def fly_campaign(
             except OSError as error:
                 raise CampaignError(f"cannot write to --out {out}: {error.strerror}") from error
             journal = held.enter_context(open_journal(out, planned, common, resume=resume))
-            held.callback(_save, kind, planned, out, parquet=parquet)
+            held.callback(
+                lambda: kind(planned, {it.flight: it for it in read_journal(out / JOURNAL)}).save(out, parquet=parquet)
+            )
             begun(len(journal.kept))
         flown: dict[int, FlightResult] = {} if journal is None else journal.kept
         done = frozenset(flown)
@@ -110,10 +112,6 @@ def fly_campaign(
     if factors := results.without_effect():
         results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ only in these are identical)")
     return results
-
-
-def _save(kind: type[CampaignResults], planned: Campaign, out: Path, *, parquet: bool) -> None:
-    kind(planned, {each.flight: each for each in read_journal(out / JOURNAL)}).save(out, parquet=parquet)
 
 
 class FlightBar:

@@ -39,11 +39,6 @@ DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
 _MAX_NAME = 200
 
 
-def folder_of(contender: str, track: str) -> str:
-    name = f"{quote(contender.replace(':', '-'), safe='')}-{folder_name(track)}"
-    return name if len(name) <= _MAX_NAME else f"{name[:_MAX_NAME]}-{sha256(name.encode()).hexdigest()[:8]}"
-
-
 def folder_name(track: str) -> str:
     return quote(track.replace(":", "-", 1), safe="=,")
 
@@ -121,8 +116,11 @@ def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], lo
 
 
 def _folder(point: Point, *, by_seeds: bool) -> str:
-    folder = f"flights/{folder_of(point.factors['contender'].name, point.factors['track'])}"
-    return f"{folder}-{point.seed}" if by_seeds else folder
+    contender = point.factors["contender"].name.replace(":", "-")
+    name = f"{quote(contender, safe='')}-{folder_name(point.factors['track'])}"
+    if len(name) > _MAX_NAME:
+        name = f"{name[:_MAX_NAME]}-{sha256(name.encode()).hexdigest()[:8]}"
+    return f"flights/{name}-{point.seed}" if by_seeds else f"flights/{name}"
 
 
 def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argparse.Namespace) -> None:

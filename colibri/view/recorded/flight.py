@@ -56,7 +56,10 @@ class RecordedFlight:
             self._truth = _read(log, TRUTH, _ROW_S)
             self._omegas = rotor_names(self.plan)
             if len(self._omegas) > ROTORS:
-                self._truth = _joined(self._truth, _read(log, MORE_TRUTH, _ROW_S))
+                more = _read(log, MORE_TRUTH, _ROW_S)
+                rows = min(len(self._truth.times_s), len(more.times_s))
+                named = {name: column[:rows] for name, column in (more.named | self._truth.named).items()}
+                self._truth = LogColumns(self._truth.times_s[:rows], named)
             self._decisions = _read(log, DECISION, 0.0)
             on_sensors = self.plan.spec.feedback is Feedback.SENSORS
             self._estimate = _read(log, ESTIMATE, _ROW_S) if on_sensors else None
@@ -177,12 +180,6 @@ def _read(log: FlightFile, topic: Topic, apart_s: float) -> LogColumns:
     wanted[::step] = wanted[-1] = True
     rows = np.vstack(list(read_blocks(log, topic, wanted)))
     return LogColumns(rows[:, 0], dict(zip(topic.names, rows.T, strict=True)))
-
-
-def _joined(truth: LogColumns, more: LogColumns) -> LogColumns:
-    rows = min(len(truth.times_s), len(more.times_s))
-    named = {name: column[:rows] for name, column in (more.named | truth.named).items()}
-    return LogColumns(truth.times_s[:rows], named)
 
 
 def _reference(plan: FlightPlan, times_s: Array, decisions: LogColumns) -> Array:
