@@ -22,14 +22,10 @@ UNEQUAL = LAW.numbers_at(0.5)._replace(inertia_kg_m2=INERTIA)
 MARGIN = 1.0 + 1e-9
 
 
-def arrays(numbers: AttitudeNumbers) -> AttitudeNumbers:
-    return AttitudeNumbers(*(np.array(value) for value in numbers))
-
-
 def directions(rng: np.random.Generator, numbers: AttitudeNumbers) -> tuple[Array, Array]:
     """Return a direction in which to look at a matrix, (3, 3), and its largest component at each vertex."""
     side = rng.normal(size=(3, 3))
-    return side, np.einsum("ij,vij->v", side, box_of(arrays(numbers)).kinematic)
+    return side, np.einsum("ij,vij->v", side, box_of(AttitudeNumbers(*map(np.array, numbers))).kinematic)
 
 
 def test_the_error_hull_covers_the_error_box() -> None:

@@ -25,10 +25,6 @@ def charge_state(sitl: Sitl) -> int:
     return int(latest(sitl, "BATTERY_STATUS").charge_state)
 
 
-def drain(sitl: Sitl, part: float) -> None:
-    sitl.inject("battery", "wrong", 0, 1.0 - part)
-
-
 @pytest.mark.sitl(airborne=10.0, params={"NAV_DLL_ACT": RETURN, "COM_DL_LOSS_T": 2.0})
 def test_any_ground_station_will_do(sitl: Sitl) -> None:
     other = sitl.client(250)
@@ -103,7 +99,7 @@ def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[S
 
 @pytest.mark.sitl(airborne=8.0, params={"COM_LOW_BAT_ACT": 2, "BAT_LOW_T": 0.1})
 def test_a_failsafe_outlives_the_autopilot(sitl: Sitl) -> None:
-    drain(sitl, 0.95)
+    sitl.inject("battery", "wrong", 0, 0.05)
     sitl.wait_until(lambda: sitl.mode is Mode.LAND, within=2.0)
     restart(sitl)
     sitl.run(1.5)

@@ -40,10 +40,6 @@ def caller(server: GroundLink) -> socket.socket:
     return socket.create_connection(("127.0.0.1", port_of(server)), timeout=5.0)
 
 
-def client_of(server: GroundLink) -> GroundLink:
-    return open_ground_link(server.url.replace("tcpin", "tcp"))
-
-
 def exchange(client: GroundLink, server: GroundLink) -> Address:
     def look() -> list[tuple[bytes, Address]]:
         client.send(HEARTBEAT)
@@ -160,7 +156,7 @@ def test_a_slow_reader_loses_whole_frames_and_blocks_nobody(server: GroundLink) 
 def test_a_client_calls_again(server: GroundLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "RECONNECT_AFTER_S", 0.01)
     url, port = server.url, port_of(server)
-    with closing(client_of(server)) as client:
+    with closing(open_ground_link(url.replace("tcpin", "tcp"))) as client:
         exchange(client, server)
         assert client.take_opened() == [client.target]
         server.close()

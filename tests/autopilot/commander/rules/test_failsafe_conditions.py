@@ -44,10 +44,6 @@ def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleSta
     return WELL.state._replace(velocity_enu_m_s=velocity, position_enu_m=position)
 
 
-def inside_of_10_m(place: Vector) -> float:
-    return 10.0 - abs(place[0])
-
-
 def test_every_condition_has_one_rule() -> None:
     assert sorted([*HOLDS, *SILENT_SINCE, *SENSORS]) == sorted(Condition)
 
@@ -175,7 +171,8 @@ def test_stopping_distance_has_bounded_acceleration_and_jerk(speed: float, maxim
 
 
 def test_a_fence_may_be_foreseen() -> None:
-    inputs = WELL._replace(fence=inside_of_10_m, state=at_speed((4.0, 0.0, 0.0), (7.0, 0.0, 5.0)))
+    state = at_speed((4.0, 0.0, 0.0), (7.0, 0.0, 5.0))
+    inputs = WELL._replace(fence=lambda place: 10.0 - abs(place[0]), state=state)
     assert Conditions().look(inputs, LIMITS, ()) == {}
     assert Condition.FENCE_BREACHED in Conditions().look(inputs, {**LIMITS, "GF_PREDICT": 1}, ())
     assert Condition.FENCE_BREACHED in Conditions().look(inputs, {**LIMITS, "GF_MARGIN": 4.0}, ())
