@@ -22,7 +22,7 @@ class Extremes:
     """Rows over time; beyond `most` of at most so many, the two extremes of each column in spans below a pixel."""
 
     def __init__(self, columns: int, rows: int, most: int) -> None:
-        self._span = 2 * ceil(rows / most)
+        self._span = 2 * max(ceil(rows / most), 1)  # without rows, too
         self._points: Array = np.empty((2 * ceil(rows / self._span), columns))
         self._count = 0
         self._rest: Array = np.empty((0, columns))
@@ -44,7 +44,7 @@ class EveryNth:
     """Rows; beyond `most` of at most so many, every second, third and so on, and the last."""
 
     def __init__(self, columns: int, rows: int, most: int) -> None:
-        self._step, self._seen = ceil(rows / most), 0
+        self._step, self._seen = max(ceil(rows / most), 1), 0
         self._points: Array = np.empty((rows // self._step + 2, columns))
         self._count = 0
 
