@@ -9,8 +9,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.common.process.spec import Starter, add_process_options, read_process
 from colibri.common.spec import add_options
 from colibri.mavlink.links.open import open_ground_link, open_link
-from colibri.mavlink.links.startup import begin, report_compiling
-from colibri.plant.process.reports import awaiting
+from colibri.mavlink.links.startup import awaiting, begin, report_compiling
 from colibri.plant.spec import PlantSpec
 
 DEFAULT_LINKS = {

@@ -8,7 +8,7 @@ from colibri.common.process.lifecycle import Stop, end_quickly, fail, use_one_th
 from colibri.common.process.output import use_streams
 from colibri.common.process.spec import Starter
 from colibri.common.process.status import Status
-from colibri.mavlink.links.link import LinkError
+from colibri.mavlink.links.link import GroundLink, LinkError
 
 Link = TypeVar("Link")
 
@@ -30,6 +30,10 @@ def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) 
     if starter.as_json:
         status.take_standard_output(patient=starter.parent is not None)
     return link, status, stop
+
+
+def awaiting(whom: str, link: GroundLink) -> str:
+    return f"waiting for {whom} on {link.url}" if link.target is None else f"connecting to {whom} at {link.url}"
 
 
 def report_compiling(status: Status) -> None:

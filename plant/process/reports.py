@@ -28,10 +28,6 @@ MAX_WAIT_S = 0.1  # between two checks whether the process shall end
 SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
 
 
-def awaiting(whom: str, link: GroundLink) -> str:
-    return f"waiting for {whom} on {link.url}" if link.target is None else f"connecting to {whom} at {link.url}"
-
-
 def all_parameters_by(vehicle: str, whom: str) -> str:
     return f"all parameters: colibri vehicle {shlex.quote(vehicle)} --for {whom}"
 
