@@ -1,13 +1,13 @@
 """Fly a plan over its link; over UDP as two processes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from time import monotonic
 
 from colibri.common.errors import InFlightError, checked
 from colibri.common.process.failure_file import keep_failure, kept_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, loading
 from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
-from colibri.flights.plan import FlightPlan, FrameCount, PlanError, unseen
+from colibri.flights.plan import UNWATCHED, FlightPlan, FrameCount, PlanError, Watcher
 from colibri.flights.provenance import write_provenance
 from colibri.mavlink.ulog.log import TopicLog
 
@@ -25,19 +25,8 @@ class FlightError(InFlightError):
         self.code, self.said = code, said
 
 
-def fly_plan(
-    plan: FlightPlan,
-    progress: Callable[[float], None] = unseen,
-    say: Callable[[str], None] = unseen,
-    compiling: Callable[[int], None] = unseen,
-    topics: TopicLog | None = None,
-) -> FrameCount:
+def fly_plan(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog | None = None) -> FrameCount:
     """Fly a plan over its link and write its provenance; with `topics` no files are written.
-
-    Args:
-        progress: Called with the simulated time, s.
-        say: Called with a line per ground link and ground station.
-        compiling: Called with the number of functions compiled so far.
 
     Raises:
         FlightError: The flight ended early; the reason is also in `FAILURE`.
@@ -46,25 +35,20 @@ def fly_plan(
     if topics is None:
         write_provenance(plan)
     if plan.spec.link == "udp":
-        return fly_processes(plan, progress, say, compiling)
+        return fly_processes(plan, watcher)
     with loading():
         from colibri.common.jit import on_compile
         from colibri.flights.in_process import fly_locally
 
-    on_compile(compiling)
+    on_compile(watcher.compiling)
     try:
-        return fly_locally(plan, progress, topics)
+        return fly_locally(plan, watcher, topics)
     except InFlightError as error:
         folder = plan.out if topics is None else None
         raise FlightError(keep_failure(error, folder)) from error
 
 
-def fly_processes(
-    plan: FlightPlan,
-    progress: Callable[[float], None] = unseen,
-    say: Callable[[str], None] = unseen,
-    compiling: Callable[[int], None] = unseen,
-) -> FrameCount:
+def fly_processes(plan: FlightPlan, watcher: Watcher = UNWATCHED) -> FrameCount:
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     summary: FrameCount | None = None
@@ -79,18 +63,19 @@ def fly_processes(
                 if kind == "compiling":
                     silent.end()
                     compiled[child.name] = event["functions"]
-                    compiling(sum(compiled.values()))
+                    watcher.compiling(sum(compiled.values()))
                 elif child.name == "autopilot":
                     if kind in _SHOWN:
-                        say(event["text"])
+                        watcher.say(event["text"])
                 elif kind == "listening":
                     autopilot = plan.autopilot_spec(event["url"].replace("udpin", "udpout"))
                     children["autopilot"] = Child(autopilot, fork=True)
+                    watcher.starting()
                 elif kind == "progress":
-                    progress(event["sim_time_s"])
+                    watcher.flown(event["sim_time_s"])
                 elif kind in ("silence", "answered"):
                     if not compiled:  # which takes long, and is shown
-                        say(event["text"])
+                        watcher.say(event["text"])
                     (silent.begin if kind == "silence" else silent.end)()
                 elif kind == "ended":
                     summary = FrameCount(event["wall_time_s"], event["frames"], event["resent"])

@@ -12,6 +12,7 @@ from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
+from colibri.mavlink.links.startup import awaiting
 from colibri.plant.physics.start import Start, nudged
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.reports import (
@@ -20,7 +21,6 @@ from colibri.plant.process.reports import (
     PlantLogs,
     Silence,
     all_parameters_by,
-    awaiting,
     closing,
     report_end,
 )
