@@ -27,7 +27,7 @@ def main(argv: list[str] | None = None) -> int:
             process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
             return process_code
     lifecycle.use_one_thread()
-    lifecycle.use_safe_path()
+    os.environ["PYTHONSAFEPATH"] = "1"  # modules of child processes are not from the working directory
     os.environ["MPLBACKEND"] = "agg"  # figures are files
     lifecycle.end_quickly()
     if threading.current_thread() is threading.main_thread():

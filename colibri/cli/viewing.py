@@ -22,9 +22,9 @@ def fly(args: Namespace) -> int:
 
 
 def sitl(args: Namespace) -> int:
-    from colibri.flights.fleet import sitl as fleet
-    from colibri.flights.fleet_spec import FleetSpec
-
+    with loading():
+        from colibri.flights.fleet import sitl as fleet
+        from colibri.flights.fleet_spec import FleetSpec
     if args.view and args.count > 1:
         fail("--view shows one vehicle: leave --count out")
     with _viewed(args, from_namespace(FleetSpec, args).links(args.instance)):

@@ -25,11 +25,6 @@ def use_one_thread() -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
-def use_safe_path() -> None:
-    """Keep the working directory off the module path of child processes."""
-    os.environ["PYTHONSAFEPATH"] = "1"
-
-
 def nudge_m() -> float:
     """Return the offset of every flight's start, m: COLIBRI_NUDGE_M, which tests the tests."""
     text = os.environ.get("COLIBRI_NUDGE_M", "0")
@@ -43,13 +38,16 @@ def nudge_m() -> float:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Load modules without garbage collection: loaded objects stay."""
+    """Load modules without garbage collection: loaded objects stay, so they count as old at once."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         if was_enabled:
+            if not gc.get_freeze_count():
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
