@@ -33,7 +33,8 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path, capfd: pytest
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
     with vehicle(tmp_path) as flown:
-        ended = companion(tmp_path / "out", flown.port, str(mission), "--dry-run", "--duration", "1", "--min-pace", "1")
+        options = ("--dry-run", "--duration", "1", "--min-pace", "1", "--max-age", "20000", "--max-gap", "20000")
+        ended = companion(tmp_path / "out", flown.port, str(mission), *options)
         assert not any(sight.armed for sight in flown.seen.sights)
         hover = ("companion", "hover", "--dry-run", "--wait", "0.3", "--out", str(tmp_path / "late"))
         capfd.readouterr()
