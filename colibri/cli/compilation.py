@@ -38,10 +38,10 @@ def compile(args: Namespace) -> int:
 
 def compile_first(profile: str, *, quiet: bool) -> None:
     """Compile on all cores if nothing was compiled yet: a flight itself compiles most on one."""
-    from colibri.common.machine_code.on_disk import folder_to_write
+    from colibri.common.machine_code.on_disk import folder_to_write, read_only_folders
 
     folder = folder_to_write()
-    if folder and not any(folder.glob("colibri.plant.*.nbc")):
+    if folder and not any(any(kept.glob("colibri.plant.*.nbc")) for kept in (folder, *read_only_folders())):
         if not quiet:
             sys.stderr.write(f"{COMPILING}\n")
         _compile([profile if profile in FLIGHTS else "flight"], quiet=quiet)

@@ -74,7 +74,7 @@ class MachineCode:
 
     @cached_property
     def _read_only(self) -> list[Any]:
-        return [self._within(folder) for folder in folders() if folder.is_dir() and not _can_be_written(folder)]
+        return [self._within(folder) for folder in read_only_folders()]
 
     def _within(self, folder: Path) -> Any:
         try:
@@ -117,7 +117,7 @@ def _report_waiting() -> None:
 
 
 def _report_nowhere() -> None:
-    if not any(folder.is_dir() for folder in folders()) and not os.environ.get(_SAID):
+    if not read_only_folders() and not os.environ.get(_SAID):
         os.environ[_SAID] = "1"
         sys.stderr.write(_NOWHERE)
 
@@ -125,13 +125,17 @@ def _report_nowhere() -> None:
 @cache
 def folders() -> list[Path]:
     """Return the folders for machine code, the best first."""
-    private = private_folder()
     named = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []  # type: ignore[attr-defined]
-    return [*named, Path(user_cache_dir("colibri", False)) / "kernels", *([private / "kernels"] if private else [])]
+    usual = Path(user_cache_dir("colibri", False))  # below "~" if the home is unknown
+    return [*named, *(it / "kernels" for it in (usual, private_folder()) if it and it.is_absolute())]
 
 
 def folder_to_write() -> Path | None:
     return next(filter(_can_be_written, folders()), None)
+
+
+def read_only_folders() -> list[Path]:
+    return [folder for folder in folders() if os.access(folder, os.R_OK | os.X_OK) and not _can_be_written(folder)]
 
 
 @cache

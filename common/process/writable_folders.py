@@ -9,13 +9,9 @@ from colibri.common.machine_code.private_folder import private_folder
 def use_writable_folders() -> None:
     if os.environ.get("MPLCONFIGDIR"):
         return
-    try:
-        home = [Path.home() / ".config", Path.home() / ".cache"]
-    except RuntimeError:  # there is none
-        home = []
-    named = [os.environ.get("XDG_CONFIG_HOME"), os.environ.get("XDG_CACHE_HOME")]
-    folders = [Path(name) if name else folder for name, folder in zip(named, home, strict=False)]
-    if folders and all(map(_can_be_written, folders)):
+    usual = {"XDG_CONFIG_HOME": "~/.config", "XDG_CACHE_HOME": "~/.cache"}
+    folders = [Path(os.environ.get(name) or os.path.expanduser(folder)) for name, folder in usual.items()]
+    if all(map(_can_be_written, folders)):
         return
     folder = private_folder()
     if folder is not None:
@@ -24,4 +20,4 @@ def use_writable_folders() -> None:
 
 def _can_be_written(folder: Path) -> bool:
     there = next(path for path in (folder, *folder.absolute().parents) if os.path.exists(path))
-    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    return folder.is_absolute() and there.is_dir() and os.access(there, os.W_OK | os.X_OK)

@@ -191,14 +191,14 @@ class _Interrupts(Listener):
     def on_end(self, _event: Event) -> None: ...
 
 
-def _unseen(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def _unseen(folder: Path, monkeypatch: pytest.MonkeyPatch, result: str = "3.0 * x") -> Any:
     """Return a kernel that is not compiled yet."""
-    text = "from colibri.common.jit import compiled\n\n@compiled\ndef tripled(x):\n    return 3.0 * x\n"
+    text = f"from colibri.common.jit import compiled\n\n@compiled\ndef computed(x):\n    return {result}\n"
     (folder / "unseen.py").write_text(text)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "unseen", raising=False)
     monkeypatch.setattr(on_disk, "folders", lambda: [folder / "cache"])
-    return importlib.import_module("unseen").tripled
+    return importlib.import_module("unseen").computed
 
 
 def test_an_interrupt_is_raised_after_compilation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,25 +217,16 @@ def test_an_interrupt_is_raised_after_compilation(tmp_path: Path, monkeypatch: p
 def test_one_process_compiles_while_others_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kernel = _unseen(tmp_path, monkeypatch)
     other = Turn(kernel._cache.lock_file(), lambda: None)  # noqa: SLF001
-    said = []
-
-    def report() -> None:
-        said.append("waiting")
-        other.end()
-
-    monkeypatch.setattr(on_disk, "waiting", [report])
+    said: list[str] = []
+    monkeypatch.setattr(on_disk, "waiting", [lambda: said.append("waiting"), other.end])
     assert kernel(1.0) == 3.0
     assert said == ["waiting"]
 
 
 def test_a_kernel_is_interpreted_while_another_compiles_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "from colibri.common.jit import compiled\n\n@compiled\ndef reciprocal(of):\n    return 1.0 / of[0].value\n"
-    (tmp_path / "apart.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(on_disk, "folders", lambda: [tmp_path / "cache"])
+    kernel = _unseen(tmp_path, monkeypatch, "1.0 / x[0].value")
     monkeypatch.setattr(on_disk, "waiting", [])
     monkeypatch.setattr(CPUDispatcher, "__call__", CPUDispatcher.__call__)  # restored by monkeypatch
-    kernel = importlib.import_module("apart").reciprocal
     argument = np.array([(0.0,)], dtype=[("value", "f8")])
     interpret_while_waiting()
     other = Turn(kernel._cache.lock_file(), lambda: None)  # noqa: SLF001
@@ -252,7 +243,7 @@ def test_kernels_of_a_read_only_folder_are_loaded(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(on_disk, "folders", lambda: [image, other])
     monkeypatch.setattr(on_disk, "_can_be_written", lambda folder: folder == other)
     monkeypatch.delitem(sys.modules, "unseen")
-    kernel = importlib.import_module("unseen").tripled
+    kernel = importlib.import_module("unseen").computed
     other.mkdir()
     assert kernel(2.0) == 6.0
     assert sum(kernel.stats.cache_hits.values()) == 1
@@ -260,7 +251,7 @@ def test_kernels_of_a_read_only_folder_are_loaded(tmp_path: Path, monkeypatch: p
 
 
 def test_versions_of_a_kernel_unused_for_months_are_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("tripled-0.1.nbc", "tripled-1.1.nbc", "other-0.1.nbc")
+    names = ("computed-0.1.nbc", "computed-1.1.nbc", "other-0.1.nbc")
     old, recent, another = (tmp_path / "cache" / f"unseen.{name}" for name in names)
     for file in (old, recent, another):
         file.parent.mkdir(exist_ok=True)
@@ -269,3 +260,10 @@ def test_versions_of_a_kernel_unused_for_months_are_deleted(tmp_path: Path, monk
         os.utime(file, (1e9, 1e9))
     _unseen(tmp_path, monkeypatch)(1.0)
     assert [file.exists() for file in (old, recent, another)] == [False, True, True]
+
+
+def test_folders_of_an_unknown_or_closed_home_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_disk, "user_cache_dir", lambda *_: "~/.cache/colibri")  # the home is unknown
+    assert "~" not in str(on_disk.folders.__wrapped__())
+    monkeypatch.setattr(on_disk, "folders", lambda: [Path("x" * 300)])  # looking there fails for root, too
+    assert not on_disk.read_only_folders()
