@@ -137,7 +137,9 @@ class ModeTasks:
             first, self.first = self.first, None
             planner = self._plan(first)
             for_law = None if self._instants.rows is None else Planner(first, self._references, self._preview)
-            return TrackTask(planner, first.duration_s, 0, for_law, start=_at_start(planner, context.now_us))
+            target = target_of(planner.horizon(context.now_us))
+            start = Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())
+            return TrackTask(planner, first.duration_s, 0, for_law, start=start)
         self._budget.spend(_TRACK_US)
         chosen = track(context.behaviour.track)
         return to_track(self._plan(chosen), chosen.duration_s)
@@ -149,8 +151,3 @@ class ModeTasks:
 def climb(context: TaskContext) -> FlightTask:
     behaviour = context.behaviour
     return TakeoffTask(context.ground_m + behaviour.takeoff_height_m, None, context, behaviour.takeoff_speed_m_s)
-
-
-def _at_start(planner: Planner, now_us: int) -> Reference:
-    target = target_of(planner.horizon(now_us))
-    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())

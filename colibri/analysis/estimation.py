@@ -123,9 +123,7 @@ def _beside_truth(log: TopicReader, topic: Topic, start_s: float) -> Iterator[tu
 
 
 def _angles_off(estimated: list[float], true: list[float]) -> Vector:
-    ew, ex, ey, ez = estimated
-    tw, tx, ty, tz = true
-    said, real = euler_from_quaternion((ew, ex, ey, ez)), euler_from_quaternion((tw, tx, ty, tz))
+    said, real = (euler_from_quaternion((w, x, y, z)) for w, x, y, z in (estimated, true))
     return (said[0] - real[0], said[1] - real[1], nearest_turn(said[2], real[2]) - real[2])
 
 

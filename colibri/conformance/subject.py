@@ -50,8 +50,7 @@ class Subject:
 
     def start(self, **changed: float) -> dict[str, float]:
         """Return a start in hover 2 m above the origin, with changes."""
-        rpm = self.vehicle.hover_speed / self.vehicle.speed_from_rpm(1.0)
-        return {"x": 0.0, "y": 0.0, "z": 2.0, "rotors": round(rpm, 3), **changed}
+        return {"x": 0.0, "y": 0.0, "z": 2.0, "rotors": round(self.vehicle.hover_rpm, 3), **changed}
 
     def build(self, profile: Profile | None = None, vehicle: Vehicle | None = None) -> Controller[Any]:
         return build_controller(profile or self.profile, vehicle or self.vehicle, perf_counter, self.law)

@@ -97,10 +97,6 @@ def scale_of(tuning: Tuning, flown: Sequence[FlightResult]) -> Scale:
     return Scale(worst, tuple(tuple(each.tolist()) for each in _counts(tuning, flown, worst)))
 
 
-def scale_kept(first: FinishedTrial) -> Scale:
-    return Scale(tuple(first.attributes[_WORST]), tuple(map(tuple, first.attributes[_EACH])))
-
-
 def _counts(tuning: Tuning, flown: Sequence[FlightResult], worst: Sequence[float]) -> list[Array]:
     metrics = tuning.campaign.metrics
     return [
@@ -214,7 +210,8 @@ def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -
     with TrialFlights(engine, tuning.common) as flights:
         while (begun := trials.ask()) is not None:
             ended = trials.ended
-            scale = scale_kept(ended[0]) if begun.number else None
+            kept = ended[0].attributes if begun.number else {}
+            scale = Scale(tuple(kept[_WORST]), tuple(map(tuple, kept[_EACH]))) if kept else None
             best = min((trial.values[0] for trial in ended), default=0.0)
             trials.tell(begun, fly_trial(tuning, begun, flights, scale, best, told.flown))
             values = [trial.values[0] for trial in trials.ended]

@@ -37,11 +37,8 @@ def page() -> str:
 def _requirements(each: Scenario | FleetScenario) -> str:
     """Return the last two cells of a row."""
     reference = "-" if each.peer == "ours" else each.peer.removeprefix("ours: ").removeprefix("ours ")
-    return f"{reference} | {each.holds}{_seeds(each)}".replace("at most", "≤")
-
-
-def _seeds(each: Scenario | FleetScenario) -> str:
-    return f"; {len(each.seeds)} seeds" if isinstance(each, Scenario) and len(each.seeds) > 1 else ""
+    seeds = f"; {len(each.seeds)} seeds" if isinstance(each, Scenario) and len(each.seeds) > 1 else ""
+    return f"{reference} | {each.holds}{seeds}".replace("at most", "≤")
 
 
 def main() -> int:

@@ -3,7 +3,6 @@
 import json
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,18 +11,14 @@ from tools import bench as rotorpy_peer
 from tools.bench import main
 
 
-def flights_of(out: Path) -> dict[str, Any]:
-    assert main(["--runs", "1", "--duration", "0.2", "--out", str(out), "--only", "flights"]) == 0
-    figures: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))["flights"]
-    return figures
-
-
 def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(rotorpy_peer, "find_spec", lambda _: None)
     monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
-    flights = flights_of(tmp_path / "flights.json")
+    out = tmp_path / "flights.json"
+    assert main(["--runs", "1", "--duration", "0.2", "--out", str(out), "--only", "flights"]) == 0
+    flights = json.loads(out.read_text(encoding="utf-8"))["flights"]
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
     assert capsys.readouterr().err == f"colibri: {rotorpy_peer.MISSING}\n"
     assert "colibri-sitl[bench]" in rotorpy_peer.MISSING

@@ -120,7 +120,9 @@ def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
     flown_s, moved_at_s = -1.0, monotonic()
     while flown_s < time_s:
         sleep(_LOOK_EVERY_S)
-        now_s = _flown_s(processes["plant"])
+        plant = processes["plant"]
+        said = plant.events("ended") or plant.events("progress") or [{"sim_time_s": 0.0}]
+        now_s = float(said[-1]["sim_time_s"])
         if now_s > flown_s:
             flown_s, moved_at_s = now_s, monotonic()
         codes = {name: process.process.poll() for name, process in processes.items()}
@@ -146,11 +148,6 @@ def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]
         if counted != sent:
             failures.append(f"the {name} counted {counted}, not {sent}")
     return failures
-
-
-def _flown_s(plant: Process) -> float:
-    said = plant.events("ended") or plant.events("progress") or [{"sim_time_s": 0.0}]
-    return float(said[-1]["sim_time_s"])
 
 
 def _memory_mib(processes: dict[str, Process]) -> dict[str, float]:

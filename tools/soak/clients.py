@@ -182,21 +182,15 @@ def faults(crew: Iterable[HarnessStation]) -> list[str]:
     return found
 
 
-def without_battery(folder: Path) -> Path:
-    """Write the Hummingbird's file without its battery."""
-    path = folder / "tireless.toml"
-    path.write_text(_VEHICLE.read_text(encoding="utf-8").partition("[battery]")[0], encoding="utf-8")
-    return path
-
-
 def soak(duration_s: float) -> tuple[list[str], list[str]]:
     """Return what was measured, and what is wrong."""
     clients = crew()
     with TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
         links = tuple(stack.enter_context(OnPort(client)).url for client in clients)
-        tireless = ("--vehicle", str(without_battery(folder)))
-        flown = stack.enter_context(vehicle(folder, *tireless, links=links))
+        tireless = folder / "tireless.toml"
+        tireless.write_text(_VEHICLE.read_text(encoding="utf-8").partition("[battery]")[0], encoding="utf-8")
+        flown = stack.enter_context(vehicle(folder, "--vehicle", str(tireless), links=links))
         processes = {child.cmdline()[3]: child for child in psutil.Process(flown.process.pid).children()}
 
         def look() -> Look:

@@ -55,7 +55,8 @@ class RangefinderBelow(FusedInstrument):
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         (distance_m,) = value
         height_m = float(x[2]) + self._part.height_m - self.ground_m
-        if distance_m == inf or distance_m > _USED_BELOW_M or height_m > _USED_BELOW_M or not is_upright(x):
+        tilted = 1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) < _MIN_COSINE
+        if distance_m == inf or distance_m > _USED_BELOW_M or height_m > _USED_BELOW_M or tilted:
             self.kind.accept(time_us)  # it works, and there is nothing to learn from it
             return None
         variance = square(self._part.noise_m) + square(self._part.noise_part * distance_m)
@@ -70,10 +71,6 @@ class RangefinderBelow(FusedInstrument):
 
     def typical(self) -> Value:
         return (self._part.height_m,)
-
-
-def is_upright(x: Array) -> bool:
-    return bool(1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) >= _MIN_COSINE)
 
 
 @compiled

@@ -47,7 +47,8 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
             changes = (_held_in_words(dips, floor_m), _stretched_in_words(stretch, limiting))
             return track, "; ".join(filter(None, changes))
         limiting = limiting or worst.name
-        excess = _widened(excess, 2 ** (count // _WIDENING) - 1)
+        neighbours = min(2 ** (count // _WIDENING) - 1, len(excess))  # the largest of each leg and those counts
+        excess = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
         stretch *= np.where(excess > 1.0, np.clip(np.sqrt(excess), *_STRETCH), 1.0)
         slowed = waypoints.stretched(stretch)
         if slowed.times_s[-1] > MAX_DURATION_S:
@@ -90,13 +91,6 @@ def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> t
     worst = demands[int(excess.max(axis=1).argmax())]
     begins = np.ceil(waypoints.times_s[:-1] / INTERVAL_S).astype(np.intp)
     return np.maximum.reduceat(excess.max(axis=0), begins), worst
-
-
-def _widened(excess: Array, neighbours: int) -> Array:
-    """Return the maximum over each leg and its neighbours on both sides, (n,)."""
-    neighbours = min(neighbours, len(excess))
-    widened: Array = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
-    return widened
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from colibri.autopilot.control.delay import MAX_DELAY_US, DelayCompensation
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.types import PerRotor
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.weather import Weather, Wind
@@ -18,11 +17,6 @@ FRAME_US = 4_000
 DELAY_US = 22_000
 HOVER = VEHICLE.hover_speed / VEHICLE.rotors.max_speed
 STILL = (0.0, 0.0, 0.0, 0.0)
-
-
-def wobble(sample: int) -> PerRotor:
-    a, b = 0.02 * (-1) ** (sample // 5), 0.01 * (-1) ** (sample // 3)
-    return (HOVER + a, HOVER + b, HOVER - a, HOVER - b)
 
 
 def flown(delay: DelayCompensation, samples: int, weather: Weather | None = None) -> list[float]:
@@ -44,7 +38,8 @@ def flown(delay: DelayCompensation, samples: int, weather: Weather | None = None
         if sample % 4 == 0:
             ahead = delay.ahead(frame, world.charge_used_ah)
             predicted[ahead.time_us] = ahead
-        command = ActuatorCommand(world.time_us, wobble(sample // 4), armed=True)
+        a, b = 0.02 * (-1) ** (sample // 20), 0.01 * (-1) ** (sample // 12)
+        command = ActuatorCommand(world.time_us, (HOVER + a, HOVER + b, HOVER - a, HOVER - b), armed=True)
         delay.sent(command)
         plant.answer(command)
     return errors

@@ -74,11 +74,6 @@ def within(limits: Limits, motions: Array, headings: Array) -> bool:
     return bool(max(shares) <= SLACK)
 
 
-def long_enough_s(limits: Limits, place: Vector) -> float:
-    slowest_m_s = min(limits.speed_m_s, limits.climb_m_s, limits.sink_m_s)
-    return 25.0 + hypot(*place) / slowest_m_s + pi / limits.yaw_rate_rad_s
-
-
 @settings(max_examples=8, deadline=None)
 @given(LIMITS, PLACES, ANGLES)
 @example(Limits(2.0, 1.0, 1.0, 6.0, 1.0, 24.0, 1.0, 1.0), (0.0, 2.0, 0.0), 0.0)
@@ -86,7 +81,9 @@ def long_enough_s(limits: Limits, place: Vector) -> float:
 @example(Limits(speed_m_s=14.0, acceleration_m_s2=8.0, jerk_m_s3=5.0), (40.0, 0.0, 0.0), 0.0)
 def test_rest_to_rest_keeps_limits_and_does_not_overshoot(limits: Limits, place: Vector, yaw_rad: float) -> None:
     target = still_target(place, yaw_rad, SAMPLES)
-    motions, headings, end = led(START, target, limits, long_enough_s(limits, place))
+    slowest_m_s = min(limits.speed_m_s, limits.climb_m_s, limits.sink_m_s)
+    long_enough_s = 25.0 + hypot(*place) / slowest_m_s + pi / limits.yaw_rate_rad_s
+    motions, headings, end = led(START, target, limits, long_enough_s)
     assert within(limits, motions, headings)
     assert (np.sign(place) * motions[:, 0] - np.abs(place)).max() <= 1e-9
     assert np.abs(headings[:, 0]).max() <= abs(yaw_rad) + 1e-9

@@ -44,11 +44,6 @@ NAME = "lpv-mpc"
 CERTIFIED = PlannedAttitude(table(NAME), VEHICLE, CONDITIONS)
 
 
-def attitude_from(errors: Array) -> Quaternion:
-    x, y, z = (0.5 * errors).tolist()
-    return float(np.sqrt(1.0 - x * x - y * y - z * z)), x, y, z
-
-
 def errors_of(attitude: Quaternion) -> Array:
     errors: Array = 2.0 * np.copysign(1.0, attitude[0]) * np.array(attitude[1:])
     return errors
@@ -102,7 +97,8 @@ def values(
     speeds = np.sqrt(np.linalg.solve(ALLOCATION, wrench))
     x = np.zeros(18)
     x[3:6], x[8] = start[[1, 3, 5]], 100.0
-    x[9:13] = attitude_from(start[[0, 2, 4]])
+    x[10:13] = 0.5 * start[[0, 2, 4]]
+    x[9] = np.sqrt(1.0 - (x[10:13] ** 2).sum())
     x[13:17] = speeds * VEHICLE.rotors.max_speed
     tracked = controller.initial(VEHICLE.hover_speed).tracked
     memory = memory_of(tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench), start[9:].copy())

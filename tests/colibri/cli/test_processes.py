@@ -42,10 +42,6 @@ def flying(out: Path) -> tuple["subprocess.Popen[str]", list[psutil.Process]]:
     return flight, psutil.Process(flight.pid).children(recursive=True)
 
 
-def alive(process: psutil.Process) -> bool:
-    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
-
-
 def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path) -> None:
     """A terminal interrupts the whole group."""
     flight, children = flying(tmp_path)
@@ -77,7 +73,10 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     flight, children = flying(tmp_path)
     flight.kill()
     flight.communicate()
-    wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+    wait_for(
+        lambda: not any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children),
+        "both processes to end",
+    )
 
 
 def test_forked_processes_fly_the_same() -> None:

@@ -68,12 +68,6 @@ def verdict(result: pytest.RunResult) -> str:
     return line.rpartition(" ")[2]
 
 
-def first_test() -> str:
-    found = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-    assert found is not None
-    return found[1]
-
-
 def test_a_run_ends_with_its_sum_which_is_the_same_again(pytester: pytest.Pytester) -> None:
     results = [run(pytester, HOVER, "--sitl-hashes", "hashes", *workers) for workers in ((), ("-n", "2"))]
     for result in results:
@@ -296,7 +290,9 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path, link: str) ->
     """The wheel alone, in a folder that knows nothing of this repository; only what is compiled is compiled already."""
     site, stranger = tmp_path / "site", tmp_path / "stranger"
     stranger.mkdir()
-    (stranger / "test_delivery.py").write_text(first_test(), encoding="utf-8")
+    found = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    (stranger / "test_delivery.py").write_text(found[1], encoding="utf-8")
     with ZipFile(build("wheel", tmp_path)) as wheel:
         wheel.extractall(site)
     environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONSAFEPATH": "1"}

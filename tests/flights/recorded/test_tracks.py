@@ -27,11 +27,6 @@ OUTER_US = 400_000
 SETTLED_RMS_M = {"expanding-spiral": 0.903, "wave": 0.805, "crown": 0.339}
 
 
-def earth_velocity(flown: dict[str, Array]) -> Array:
-    columns = np.stack([flown[name] for name in ("phi", "theta", "psi", "u", "v", "w")], axis=1)
-    return np.array([earth_from_body(quaternion_from_euler(*row[:3]), tuple(row[3:])) for row in columns.tolist()])
-
-
 @cache
 def flown_directly(name: str, profile: str = "thesis") -> tuple[dict[str, Any], dict[str, Array]]:
     """Fly a whole track without a link, once for all tests; return the report and the rows."""
@@ -49,7 +44,8 @@ def test_the_outer_loop_decides_as_the_thesis_says(name: str) -> None:
     mass_kg, gravity_m_s2 = 0.698, 9.81
     table = Planner(track(name), "by-differences", Preview(OUTER_US, 1)).table
     point = np.stack([flown["x"], flown["y"], flown["z"]], axis=1)[0:1000:4]
-    speed = earth_velocity(flown)[0:1000:4]
+    motion = np.stack([flown[name] for name in ("phi", "theta", "psi", "u", "v", "w")], axis=1)[0:1000:4].tolist()
+    speed = np.array([earth_from_body(quaternion_from_euler(*row[:3]), tuple(row[3:])) for row in motion])
     wanted = 2.0 * (table.position_enu_m[1:251] - point) + 3.0 * (table.velocity_enu_m_s[1:251] - speed)
     lift = wanted[:, 2] + gravity_m_s2
     yaw = table.yaw_rad[1:251]

@@ -74,7 +74,8 @@ def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]], show
     notes, inner = _notes(kind), []
     for field in info.fields:
         key = f"{above}.{field.encode_name}".lstrip(".")
-        table = _table_of(field.type)
+        parts = field.type.types if isinstance(field.type, kinds.UnionType) else (field.type,)
+        table = next((part.cls for part in parts if isinstance(part, kinds.StructType)), None)
         value, comment, where = said.get(key, ("", "", ""))
         note = notes.get(field.name) or comment
         if table is not None:
@@ -98,11 +99,6 @@ def _optional(field: kinds.Field) -> str:
 
 def _first_line(kind: Any) -> str:
     return cleandoc(kind.__doc__).partition("\n\n")[0].replace("\n", " ")
-
-
-def _table_of(kind: kinds.Type) -> Any:
-    parts = kind.types if isinstance(kind, kinds.UnionType) else (kind,)
-    return next((part.cls for part in parts if isinstance(part, kinds.StructType)), None)
 
 
 def _what(kind: kinds.Type) -> str:

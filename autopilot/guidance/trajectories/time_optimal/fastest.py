@@ -37,7 +37,8 @@ def fastest(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, 
         if last:
             return _within(waypoints, reach, legs_s, points)
         pieces *= 2
-        points = _halved(_track(waypoints, legs_s, points), legs_s, pieces, floor_m)
+        points = position(_track(waypoints, legs_s, points), _knots(legs_s, pieces))
+        points[:, 2] = np.maximum(points[:, 2], floor_m)
 
 
 def _wanted_pieces(legs: int) -> int:
@@ -84,12 +85,6 @@ def _beyond(waypoints: Waypoints, reach: Reach, track: Track) -> list[tuple[floa
     motion = exact_motion(track)
     demands = reach.demands(motion, reach.charge_of(motion))
     return [(float(demand.beyond(waypoints.margin).max()), demand) for demand in demands]
-
-
-def _halved(track: Track, legs_s: Array, pieces: int, floor_m: float) -> Array:
-    points = position(track, _knots(legs_s, pieces))
-    points[:, 2] = np.maximum(points[:, 2], floor_m)
-    return points
 
 
 def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) -> tuple[Track, str]:

@@ -6,7 +6,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.fitting import ROUNDING_M, fit
-from colibri.autopilot.guidance.trajectories.reach import Demand, Reach, exact_motion, times
+from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion, times
 from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
 from colibri.autopilot.guidance.trajectories.waypoint_file import MARGIN, Waypoints, read_waypoints
 from colibri.common.types import Array
@@ -35,11 +35,8 @@ def random_points(seed: int, lowest_m: float = 1.0) -> str:
 
 
 def excess(track: Track, margin: float) -> float:
-    return max(float(demand.excess(margin).max()) for demand in _demands(track))
-
-
-def _demands(track: Track) -> list[Demand]:
-    return reach().demands(exact_motion(track), reach().charge_of_hover(track.duration_s))
+    demands = reach().demands(exact_motion(track), reach().charge_of_hover(track.duration_s))
+    return max(float(demand.excess(margin).max()) for demand in demands)
 
 
 def heights(track: Track) -> Array:

@@ -58,10 +58,11 @@ def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: Recorde
         tab_page.get_by_text("t 5.00 s").wait_for()
         tab_page.get_by_role("button", name="Play").wait_for()
         shot = tab_page.screenshot()
-        now = np.abs(np.asarray(Image.open(BytesIO(shot)).convert("RGB"), dtype=int) - NOW).sum(axis=2) < 120
+        pixels = np.asarray(Image.open(BytesIO(shot)).convert("RGB"), dtype=int)
+        now = np.abs(pixels - NOW).sum(axis=2) < 120
         assert now.sum(axis=0).max() > 100, "a line upwards in each plot"
         assert now.sum(axis=1).max() < 20, "and none along an axis"
-        picture = _middle(shot)
+        picture = pixels[:, 300:890]  # between the panels
         assert np.count_nonzero(picture[:, :, 2] > picture[:, :, 0] + BLUE_OVER_RED) > 200
         assert not tab.complaints
 
@@ -70,8 +71,3 @@ def _obey(page: Page, show: Show, now_s: float) -> None:
     done = page.controls.done.get(timeout=60.0)
     page.controls.done.put(done)
     show.turn(now_s)
-
-
-def _middle(png: bytes) -> np.ndarray:
-    """Return the pixels between the panels as integers, (rows, columns, 3)."""
-    return np.asarray(Image.open(BytesIO(png)).convert("RGB"), dtype=int)[:, 300:890]
