@@ -34,7 +34,8 @@ _LOADED: dict[Motor, float] = {"brushless": 0.65, "brushed": 0.45}  # speed at f
 _APART, _IN_WAKE = 0.1, 0.85
 """Coaxial rotors: half of what they are apart, in diameters; thrust of the lower one, by measurements of 0.8 to 0.9."""
 _AIR_KG_M3, _BODY_KG_M3, _DRAG_COEFFICIENT, _AIRSPEED_M_S = 1.2, 400.0, 1.2, 5.0
-"""Drag of a body with battery and motors: small ones are light for their size, as area grows with mass to the 2/3."""
+"""Drag of a body with battery and motors: small ones are light for their size, as area grows with mass to the 2/3. The
+rotors' grows with their speed, but not on small vehicles: that of the Crazyflie was identified without."""
 _OTHER = {"ccw": "cw", "cw": "ccw"}
 _UNITS = {
     "throttle": {"": 1.0, "percent": 0.01, "pct": 0.01, "%": 0.01},
@@ -171,7 +172,11 @@ def vehicle_file(sheet: DataSheet) -> tuple[str, list[str]]:
             f"largest thrust {max_n:.3g} N is {floor(100.0 * ratio) / 100.0:g} times the weight: at least"
             f" {_MIN_THRUST_TO_WEIGHT} is required (look at --mass, --propeller, --kv, --cells)"
         )
-    text = _template(sheet).format(**_numbers(sheet, rotor, hover)) + _sensors()
+    template = Path(__file__).with_name("new_vehicle.toml.in").read_text(encoding="utf-8")
+    if sheet.capacity_ah is None:
+        template = template.partition("\n[battery]")[0]
+    sensors = vehicle_text("hummingbird").partition("# Sensors of a flight controller board")
+    text = template.format(**_numbers(sheet, rotor, hover)) + "\n" + "".join(sensors[1:])
     try:
         read_settings(tomllib.loads(text), Vehicle)
     except (SettingsError, tomllib.TOMLDecodeError) as error:
@@ -215,7 +220,9 @@ def _rotor(sheet: DataSheet) -> tuple[_Rotor, list[str]]:
     """Return thrust coefficient and top speed in rad/s: measured before computed."""
     stand, speed, speed_from = sheet.stand, None, ""
     notes: list[str] = []
-    coefficient, origin = _propeller_coefficient(sheet.propeller), "estimated from the propeller"
+    diameter_in, pitch_in = sheet.propeller.diameter_m / _M_PER_INCH, sheet.propeller.pitch_m / _M_PER_INCH
+    coefficient = 1.858e-11 * float(diameter_in**3.5) * sqrt(pitch_in) / _RAD_S_PER_RPM**2  # N s², by static thrust
+    origin = "estimated from the propeller"
     if sheet.kv_rpm_v is not None and sheet.cells is not None:
         loaded = _LOADED[sheet.motor or "brushless"]
         speed = loaded * sheet.kv_rpm_v * sheet.cells * _CELL_FULL_V * _RAD_S_PER_RPM
@@ -239,12 +246,6 @@ def _rotor(sheet: DataSheet) -> tuple[_Rotor, list[str]]:
     return _Rotor(thrust_n / speed**2, f"{thrust_from}, at max_speed", speed, speed_from), notes
 
 
-def _propeller_coefficient(propeller: Propeller) -> float:
-    """Return N s² of a propeller: static thrust 1.858e-11 rpm² d³·⁵ √pitch, with d and pitch in inches."""
-    diameter_in, pitch_in = propeller.diameter_m / _M_PER_INCH, propeller.pitch_m / _M_PER_INCH
-    return 1.858e-11 * float(diameter_in**3.5) * sqrt(pitch_in) / _RAD_S_PER_RPM**2
-
-
 def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     mass, arm, size = sheet.mass_kg, sheet.arm_m, sheet.propeller.diameter_m
     motors = sheet.motors
@@ -261,7 +262,13 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     pitch = "" if sheet.propeller.pitch_given else "; pitch estimated"
     by = "brushes" if sheet.motor == "brushed" else "size"
     body_drag = 0.5 * _AIR_KG_M3 * _DRAG_COEFFICIENT * (mass / _BODY_KG_M3) ** (2.0 / 3.0) * _AIRSPEED_M_S
+    rotor_drag = 1.2 * mass * _GRAVITY_M_S2 / (2.0 * size * hover * hover)
+    across = body_drag
+    if size < _TOY_M:
+        across, rotor_drag = body_drag + len(motors) * hover * rotor_drag, 0.0
     estimated_drag = "estimated, by the size of a body of 400 kg/m³, at 5 m/s; of the rotors by tip speed in hover"
+    stacked = any(motor.level < 0 for motor in motors)
+    in_wake = _texts(tuple(_IN_WAKE if motor.level < 0 else 1.0 for motor in motors))
     return {
         "name": '"' + sheet.name.replace("\\", "\\\\").replace('"', '\\"') + '"',
         "mass": _text(mass),
@@ -278,12 +285,13 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         "places": ", ".join(_texts(place) for place in places),
         "places_from": f"arm {_text(arm)} m, layout {sheet.layout}, order {sheet.order}",
         "spins": ", ".join(f'"{spin}"' for spin in spins),
-        "strength": _strength(motors),
+        "strength": f"strength = {in_wake}  # estimated: lower rotors in the wake of upper ones\n" if stacked else "",
         "lag": _text(lag),
         "lag_from": "given" if sheet.lag_s else f"estimated, high, by {by}",
-        "drag": _texts((body_drag, body_drag, 1.6 * body_drag) if drag is None else (drag, drag, drag)),
+        "drag": _texts((across, across, 1.6 * body_drag) if drag is None else (drag, drag, drag)),
         "drag_from": estimated_drag if drag is None else "given, with the rotors'",
-        "rotor_drag": _text(1.2 * mass * _GRAVITY_M_S2 / (2.0 * size * hover * hover) if drag is None else 0.0),
+        "rotor_drag": _text(rotor_drag if drag is None else 0.0),
+        "learned": "true" if drag is None else "false",
         "feet": ", ".join(_texts((0.6 * x, 0.6 * y)) for x, y, *_ in dict.fromkeys(place[:2] for place in places)),
         "depth": _text(0.3 * arm),
         "stiffness": _text(12_900.0 * mass),
@@ -296,28 +304,9 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     }
 
 
-def _strength(motors: list[Place]) -> str:
-    if all(motor.level >= 0 for motor in motors):
-        return ""
-    parts = _texts(tuple(_IN_WAKE if motor.level < 0 else 1.0 for motor in motors))
-    return f"strength = {parts}  # estimated: lower rotors in the wake of upper ones\n"
-
-
 def _text(number: float) -> str:
     return f"{0.0 if abs(number) < 1e-12 else number:.5g}"
 
 
 def _texts(numbers: tuple[float, ...]) -> str:
     return f"[{', '.join(map(_text, numbers))}]"
-
-
-def _template(sheet: DataSheet) -> str:
-    """Return the template of a file, with the battery if it is known."""
-    text = Path(__file__).with_name("new_vehicle.toml.in").read_text(encoding="utf-8")
-    return text.partition("\n[battery]")[0] if sheet.capacity_ah is None else text
-
-
-def _sensors() -> str:
-    """Return the sensors of the Hummingbird's file: those of a flight controller board of today."""
-    text = vehicle_text("hummingbird")
-    return "\n" + text[text.index("# Sensors of a flight controller board") :]

@@ -176,6 +176,8 @@ class Drag(Table, frozen=True, kw_only=True):
     quadratic_n_s2_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
     """Quadratic drag of the airframe along the FLU axes: N per m/s along the axis and per m/s of airspeed. Only the
     plant models it; control laws estimate it as a disturbance."""
+    learned: bool = False
+    """Whether linear drag and rotor drag are only estimates: the law `lpv-mpc` then learns them in flight."""
 
 
 class Ground(Table, frozen=True, kw_only=True):

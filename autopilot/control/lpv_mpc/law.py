@@ -8,6 +8,8 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import (
+    AT_REST,
+    AttitudeController,
     AttitudeDemand,
     Clock,
     Decision,
@@ -17,6 +19,7 @@ from colibri.autopilot.control.interface import (
     PlanColumns,
     Preview,
     VehicleState,
+    still_horizon,
 )
 from colibri.autopilot.control.lpv_mpc import compromise, planning
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation
@@ -27,16 +30,21 @@ from colibri.autopilot.control.lpv_mpc.path import PathSettings
 from colibri.autopilot.control.lpv_mpc.planning import PREDICTED, Now
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.autopilot.control.parts.level import levelled, seen_level
-from colibri.autopilot.control.parts.recovery import RecoverySettings
+from colibri.autopilot.control.parts.recovery import RecoverySettings, TurnGains, mix_with_priority, turning_moment
 from colibri.autopilot.control.parts.riccati import gains
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
-from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
-from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked
+from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, VehicleTracker
 from colibri.autopilot.control.scaling import scaled
+from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, ObserverSettings
+from colibri.autopilot.control.vehicle_model.drag import with_learned
+from colibri.autopilot.control.vehicle_model.mass import MassSettings
+from colibri.autopilot.control.vehicle_model.mixer import mixing_of
 from colibri.common.config import Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import opened, packed
-from colibri.common.matrices import dot
+from colibri.common.matrices import dot, matvec, norm
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
@@ -48,6 +56,7 @@ _SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
 times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
 
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
+_UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -69,9 +78,13 @@ class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True
     poles: tuple[Negative, Negative]
 
 
-class LpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The control law."""
 
+    control_interval_s: ControlInterval
+    observer: ObserverSettings
+    mass: MassSettings
+    qp: QpSettings
     guidance: GuidanceSettings
     plan: PlanSettings
     path: PathSettings
@@ -96,7 +109,7 @@ class LawInputs(NamedTuple):
     airborne: bool
 
 
-class LpvMpc(TrackingLaw[LawMemory]):
+class LpvMpc(AttitudeController[LawMemory]):
     """The control law; its predicted outputs are `planning.PREDICTED`, then the squared speeds of the rotors."""
 
     reads_motion = False
@@ -105,15 +118,17 @@ class LpvMpc(TrackingLaw[LawMemory]):
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(scaled("lpv-mpc", table, vehicle), LpvMpcSettings)
         vehicle, self._to_body = levelled(vehicle)
-        super().__init__(settings, settings.fallback, vehicle)
-        h = self._interval_s
+        h = self._interval_s = settings.control_interval_s
+        self.control_interval_us = interval_us(h)
+        self.tracker = VehicleTracker(vehicle, settings.observer, settings.mass, h)
+        self._shifted_samples, self._mixing = settings.fallback.shifted_samples, mixing_of(self.tracker.allocation)
+        self._turn = TurnGains(settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s)
         max_tilt_deg = settings.guidance.max_tilt_deg
         upright = max_tilt_deg < 90.0
         self.tilts_freely = not upright
         self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock, upright=upright)
         self.min_path_speed = settings.path.min_speed
-        samples = self._mpc.horizon + 2
-        samples = ceil(settings.path.max_speed * samples)
+        samples = ceil(settings.path.max_speed * (self._mpc.horizon + 2))
         self.preview = Preview(self.control_interval_us, samples if upright else max(samples, compromise.SAMPLES))
         self._span_n = float(self.tracker.allocation[0].sum())
         if vehicle.rotors.count > len(AXES):  # without moments
@@ -141,14 +156,31 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self._now = packed(Now(np.empty(RIGID), np.empty(vehicle.rotors.count), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
-        self._model_kg = self._mpc.model["airframe"]["mass_kg"]
+        self._model, self._airframe = self._mpc.model["airframe"], airframe_of(vehicle)
 
     def warm_up(self) -> None:
-        super().warm_up()
+        """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""
+        memory, references = self.initial(self.tracker.vehicle.hover_speed), still_horizon(self.preview.samples)
+        for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
+            memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)
+        level, _, _, _, _, no_thrust, _, _ = references
+        self.step_attitude(memory, 0, AT_REST, AttitudeDemand(level, level, no_thrust))
         self._mpc.warm_up()
 
     def initial(self, rotor_speed: float) -> LawMemory:
         return LawMemory(self.tracker.initial(rotor_speed), None, 0, 0)
+
+    def charge_ah(self, memory: LawMemory) -> float:
+        return memory.tracked.charge_ah
+
+    def with_charge(self, memory: LawMemory, charge_ah: float) -> LawMemory:
+        return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
+
+    def mass_kg(self, memory: LawMemory) -> float:
+        return memory.tracked.mass_kg
+
+    def with_mass(self, memory: LawMemory, mass_kg: float) -> LawMemory:
+        return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))
 
     def lag_us(self, memory: LawMemory) -> int:
         return memory.lag_us
@@ -190,7 +222,9 @@ class LpvMpc(TrackingLaw[LawMemory]):
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
         observed = self.tracker.observe(tracked, state)
-        self._model_kg[0] = observed.mass_kg
+        self._model["mass_kg"] = observed.mass_kg
+        if observed.estimate.size > ESTIMATES:
+            self._model[0] = with_learned(self._airframe, observed.mass_kg, observed.estimate[ESTIMATES:])
         expected = (
             memory.plan.states[memory.age :, PREDICTED:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
         )
@@ -245,7 +279,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         )
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
-        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):
+        if memory.plan is not None and memory.age <= min(self._shifted_samples, self._mpc.horizon - 1):
             how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
             return memory.plan.commands[memory.age], memory.plan, memory.age + 1, how
         return self._recover(inputs, force, diagnostics)
@@ -253,8 +287,11 @@ class LpvMpc(TrackingLaw[LawMemory]):
     def _recover(
         self, inputs: LawInputs, force: Array, diagnostics: Diagnostics
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        least, most = self._arrays.limits[0].tolist()
-        squared = self.recovered(force, inputs.observed, least, most)
+        """Turn the thrust axis to `force` the shortest way."""
+        rotation, rates = inputs.observed.rotation, inputs.observed.rigid[10:]
+        moments = turning_moment(matvec(rotation.T, force / norm(force)), rates, self.tracker.inertia, self._turn)
+        thrust_n = max(dot(force, rotation[:, 2].copy()), 0.0)
+        squared = mix_with_priority(thrust_n, moments, self._mixing, *self._arrays.limits[0].tolist())
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
 
 

@@ -15,6 +15,7 @@ from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     observe,
     observer_of,
 )
+from colibri.autopilot.control.vehicle_model.drag import LEARNED
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorModel
 from colibri.common.compiled_rotations import rotation_matrix
@@ -67,14 +68,14 @@ class VehicleTracker:
 
     def initial(self, rotor_speed: float) -> Tracked:
         speeds = np.full(self.vehicle.rotors.count, rotor_speed / self.vehicle.rotors.max_speed)
-        wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES)
+        learned = LEARNED if self.vehicle.drag and self.vehicle.drag.learned else 0
+        wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES + learned)
         return Tracked(speeds, wrench, wrench, None, estimate, 0.0, self.vehicle.body.mass_kg)
 
     def observe(self, tracked: Tracked, state: VehicleState) -> Observed:
         before, attitude = tracked.measured, state.attitude
         rigid = np.array((*state.position_enu_m, *state.velocity_enu_m_s, *attitude, *state.rate_flu_rad_s))
-        rotation, measured, estimate = np.empty((3, 3)), np.empty(MEASURED), np.empty(ESTIMATES)
-        known = (rigid, rotation, measured, estimate)
+        rotation, measured, estimate = np.empty((3, 3)), np.empty(MEASURED), np.empty_like(tracked.estimate)
         mass_kg, max_speed, current_a = look(
             rigid,
             tracked.speeds,
@@ -93,7 +94,7 @@ class VehicleTracker:
             measured,
             estimate,
         )
-        return Observed(*known, mass_kg, max_speed, current_a)
+        return Observed(rigid, rotation, measured, estimate, mass_kg, max_speed, current_a)
 
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state."""
@@ -106,8 +107,7 @@ class VehicleTracker:
             commands, speeds = commands[: self._rotor_count], speeds[: self._rotor_count]
             wrench, mean_wrench = wrench[:_WRENCH], mean_wrench[:_WRENCH]
         charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
-        after = Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
-        return commands, after
+        return commands, Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
 
 
 @compiled
@@ -139,8 +139,9 @@ def look(
         h = dot(momentum, speeds)
         put(observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer), estimate)
     else:
+        put(estimate_before, estimate)
         put(measured, estimate[:6])
-        estimate[6:] = 0.0
+        estimate[6:ESTIMATES] = 0.0
     if airborne:
         mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], mass)
     else:

@@ -9,15 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, airframe_of, drag_force
+from colibri.autopilot.control.vehicle_model.drag import learn_drag
 from colibri.common.config import Positive, Table
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import exp
+from colibri.common.matrices import put
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _NEAR_GROUND = 0.2  # of the largest moment: a larger one comes from the feet
 ESTIMATES = 12  # velocity, m/s (ENU); body rates, rad/s; disturbances: acceleration, m/s² (ENU), and moment, N m
+"""If drag is learned, `drag.LEARNED` numbers follow."""
 MEASURED = 9  # velocity, m/s (ENU); body rates, rad/s; body z axis (ENU)
 
 
@@ -45,13 +48,9 @@ class ObserverModel(NamedTuple):
 
 
 def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> ObserverModel:
-    on_velocity, on_acceleration = gains(settings.acceleration_rad_s, interval_s)
-    on_rate, on_turn = gains(settings.moment_rad_s, interval_s)
     return ObserverModel(
-        on_velocity,
-        on_acceleration,
-        on_rate,
-        on_turn,
+        *gains(settings.acceleration_rad_s, interval_s),
+        *gains(settings.moment_rad_s, interval_s),
         settings.max_acceleration_m_s2,
         settings.max_moment_n_m,
         airframe_of(vehicle),
@@ -81,14 +80,22 @@ def observe(
     thrust_n, moment_n_m = wrench[0], wrench[1:]
     middle = 0.5 * (before + now)
     rate, up = middle[3:6], middle[6:]
+    after = np.empty_like(estimate)
     drag_n = drag_force(airframe, middle[:3], up, thrust_n)
+    if estimate.shape[0] > ESTIMATES:
+        put(estimate[ESTIMATES:], after[ESTIMATES:])
+        unexplained = np.empty(3)
+        for i in range(3):
+            weight = airframe.gravity_m_s2 if i == 2 else 0.0
+            unexplained[i] = (now[i] - before[i]) / interval_s + weight - thrust_n / mass_kg * up[i]
+        x, y, z = learn_drag(drag_n, unexplained, up, airframe, interval_s, after[ESTIMATES:])
+        drag_n = (mass_kg * x, mass_kg * y, mass_kg * z)
     turn = np.empty(3)
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     p, q, r = rate
     turn[0] = (moment_n_m[0] + (iy - iz) * q * r - momentum * q) / ix
     turn[1] = (moment_n_m[1] + (iz - ix) * p * r + momentum * p) / iy
     turn[2] = (moment_n_m[2] + (ix - iy) * p * q) / iz
-    after = np.empty(ESTIMATES)
     for i in range(3):
         explained = (drag_n[i] + thrust_n * up[i]) / mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
         expected = estimate[i] + interval_s * (explained + estimate[6 + i])
@@ -106,7 +113,8 @@ def observe(
 
 @compiled
 def limit_near_ground(estimate: Array, before: Array, packed: Packed) -> None:
-    """Limit the lift and the moments: those of the feet end with the take-off."""
+    """Limit the lift and the moments: those of the feet end with the take-off. Drag is learned in the air."""
+    put(before[ESTIMATES:], estimate[ESTIMATES:])
     estimate[8] = min(estimate[8], max(before[8], _NEAR_GROUND * packed[0].max_acceleration_m_s2))
     for i in range(9, ESTIMATES):
         most = max(abs(before[i]), _NEAR_GROUND * packed[0].max_moment_n_m)

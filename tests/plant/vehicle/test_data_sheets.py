@@ -2,14 +2,14 @@
 
 import tomllib
 from math import hypot
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 
+from colibri.campaigns.factors import SCALED, with_keys
 from colibri.common.config import read_settings
-from colibri.conformance.vehicle_flights import Trial, fly, lemniscate
+from colibri.conformance.vehicle_flights import NUMBERS, Trial, fly, lemniscate
 from colibri.plant.vehicle.data_sheets import LAYOUTS, ORDERS, DataSheet, propeller_of, thrust_stand_of, vehicle_file
 from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
 from tests.support.refusals import refusal_of
@@ -19,7 +19,7 @@ CF21 = DataSheet(
     "cf", 0.0319, 0.046, propeller_of("45mm"), order="clockwise", motor="brushed", kv_rpm_v=14000.0, cells=1,
     hover_throttle=0.65, drag_n_s_m=0.0147,
 )  # fmt: skip
-TRUE_CF21 = Path(__file__).parents[2] / "tools" / "vehicles" / "cf21.toml"
+ESTIMATED = CF21._replace(drag_n_s_m=None)
 STAND = "throttle_percent,Thrust (g),Speed (rpm),Current (A)\n50,300,4000,3\n100,1200,8000,12\n"
 
 
@@ -51,7 +51,7 @@ def test_a_written_vehicle_is_complete(sheet: DataSheet) -> None:
 
 
 def test_lag_and_inertia_are_not_below_those_of_the_true_vehicle() -> None:
-    true, found = load_vehicle(str(TRUE_CF21)), written(CF21)
+    true, found = load_vehicle("crazyflie"), written(CF21)
     assert true.rotors.lag is not None
     assert found.rotors.lag is not None
     assert found.rotors.lag.time_constant_up_s >= true.rotors.lag.time_constant_up_s
@@ -59,13 +59,14 @@ def test_lag_and_inertia_are_not_below_those_of_the_true_vehicle() -> None:
     assert found.rotors.direction == true.rotors.direction
 
 
-@pytest.mark.parametrize(("sheet", "arms"), [(CF21, 0.1), (CF21._replace(drag_n_s_m=None), 0.25)])
-def test_a_vehicle_from_data_sheets_flies_the_true_one(sheet: DataSheet, arms: float) -> None:
-    true = load_vehicle(str(TRUE_CF21))
+@pytest.mark.parametrize(("sheet", "drag"), [(CF21, 1.0), (ESTIMATED, 1.0), (ESTIMATED, 1.6)])
+def test_a_vehicle_from_data_sheets_flies_the_true_one(sheet: DataSheet, drag: float) -> None:
+    true = load_vehicle("crazyflie")
     options = {"track": lemniscate(true), "plant_vehicle": true}
-    flown = fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, written(sheet))
+    assumed = with_keys({f"vehicle.{key}{SCALED}": drag for key in NUMBERS["drag"]}, "vehicle", written(sheet))
+    flown = fly(true, Trial(lambda _: options, 12.0), {"profile": "flight"}, assumed)
     assert not flown.lost
-    assert flown.error_m < arms * CF21.arm_m
+    assert flown.error_m < 0.05 * CF21.arm_m
 
 
 def test_a_thrust_stand_wins_over_estimates() -> None:
