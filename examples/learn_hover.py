@@ -6,7 +6,7 @@ Prints:
 
 import sys
 
-import cma
+import cma  # pip install cma "colibri-sitl[gym,onnx]"
 import numpy as np
 
 import colibri.gym

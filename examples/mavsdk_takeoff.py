@@ -17,7 +17,7 @@ mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_ST
 mavsdk.add_any_connection(sys.argv[1] if len(sys.argv) > 1 else "udpin://127.0.0.1:14540")
 vehicle = mavsdk.first_autopilot(10.0)
 if vehicle is None:
-    sys.exit("no vehicle within 10 s: is `colibri sitl` running?")
+    sys.exit("no vehicle within 10 s: is `colibri sitl` running? Its first start compiles for a minute.")
 print("connected")
 action, telemetry = Action(vehicle), Telemetry(vehicle)
 while not telemetry.health_all_ok():

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 link = mavutil.mavlink_connection(sys.argv[1] if len(sys.argv) > 1 else "udpin:127.0.0.1:14550", source_system=255)
 link.mav.heartbeat_send(6, 8, 0, 0, 0)  # a ground station; a link that waits answers whoever speaks
 if link.wait_heartbeat(timeout=10) is None:
-    sys.exit("no vehicle within 10 s: is `colibri sitl` running?")
+    sys.exit("no vehicle within 10 s: is `colibri sitl` running? Its first start compiles for a minute.")
 print("connected")
 mav = mavutil.mavlink
 
