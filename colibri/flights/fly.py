@@ -40,7 +40,8 @@ def fly_plan(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog | 
         from colibri.common.jit import on_compile
         from colibri.flights.in_process import fly_locally
 
-    on_compile(watcher.compiling)
+    if watcher is not UNWATCHED:
+        on_compile(watcher.compiling)
     try:
         return fly_locally(plan, watcher, topics)
     except InFlightError as error:
