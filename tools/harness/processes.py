@@ -175,6 +175,8 @@ def vehicle(
         flown = SitlProcess(process, seen, state, said, printed)
         try:
             wait_for(lambda: seen.sights or process.poll() is not None, "the vehicle's first word", _COMPILES_HOURS)
+            waits = sum(url.startswith(("udpin:127.0.0.1", "tcpin:127.0.0.1")) for url in links)
+            wait_for(lambda: len(flown.ports) >= waits or process.poll() is not None, "its ports")
             assert process.poll() is None, flown.said
             yield flown
         finally:
