@@ -75,6 +75,8 @@ test-clients: setup .venv-clients/.ready
 
 # Real PX4 and ArduCopter on our plant: COLIBRI_PX4=FOLDER, a build of its SITL, and COLIBRI_ARDUCOPTER=FILE, the program.
 test-peers: setup
+	@test -n "$(COLIBRI_PX4)$(COLIBRI_ARDUCOPTER)" || \
+	  { echo "make test-peers needs COLIBRI_PX4=FOLDER or COLIBRI_ARDUCOPTER=FILE" >&2; exit 2; }
 	$(BIN)/python -m pytest -m peers
 
 fuzz: setup

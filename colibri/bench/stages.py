@@ -23,7 +23,6 @@ from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.bench.speed import CONTROLLER, TRACK, plan_of, with_blocks
 from colibri.flights.in_process import fly_locally
-from colibri.flights.plan import Watcher
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.open import open_link
@@ -72,24 +71,21 @@ class StageTimes(NamedTuple):
     commands: list[bytes]
 
 
-class _Begun(Watcher):
-    is_flying = False
-
-    def flown(self, _sim_time_s: float) -> None:
-        self.is_flying = True
-
-
 def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageTimes:
     """Fly in memory, timing every stage once all code is loaded."""
     flight = StageTimes({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
     every = max(1, round(duration_s / float(profile.table(CONTROLLER)["control_interval_s"]) / _QPS))
-    seen, begun = 0, _Begun()
+    seen, flying = 0, False
 
     def keep_qp(_result: Any, _kind: Any, qp: Qp, *_: Any) -> None:
         nonlocal seen
         if seen % every == 0:
             flight.qps.append(deepcopy(qp))
         seen += 1
+
+    def begun(_sim_time_s: float) -> None:
+        nonlocal flying
+        flying = True
 
     keepers: dict[str, Callable[..., object]] = {
         "QP": keep_qp,
@@ -101,7 +97,7 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageT
     with ExitStack() as stack:
         for stage in (*STAGES, *LINK_STAGES):
             keeper = keepers.get(stage.name, lambda *_: None)
-            stack.enter_context(timed(stage, flight.times_us[stage.name], keeper, lambda: begun.is_flying))
+            stack.enter_context(timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
         fly_locally(plan, begun)
     return flight
 

@@ -208,7 +208,7 @@ def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) ->
 
 def invariant_set(loop: UncertainLoop) -> Proof | None:
     """Find the largest set V <= 1 that is never left, within all limits."""
-    return _first(loop, _SET_RATIOS, lambda it, ratio: (it.spread(), [it.supplied(ratio), *map(it.within, it.limits)]))
+    return _first(loop, _SET_RATIOS, _set_program)
 
 
 def attractor(loop: UncertainLoop) -> Proof | None:
@@ -226,6 +226,10 @@ def terminal_weight(loop: UncertainLoop) -> Proof | None:
     cost[: len(problem.basis)] = np.trace(problem.basis, axis1=1, axis2=2)
     x = minimise(cost, [], problem.decrease(1.0, stage=True))
     return problem.proof(x, 1.0) if x is not None else None
+
+
+def _set_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequality]]:
+    return problem.spread(), [problem.supplied(ratio), *(problem.within(row) for row in problem.limits)]
 
 
 def _attractor_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequality]]:

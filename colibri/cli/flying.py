@@ -2,9 +2,9 @@
 
 import argparse
 import sys
-from contextlib import AbstractContextManager
-from functools import cached_property
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeAlias
 
 from colibri.analysis.limits import exceeded, loss_exceeds
 from colibri.cli.compilation import compile_first
@@ -15,15 +15,12 @@ from colibri.common.spec import from_namespace
 from colibri.flights.effects import in_words
 from colibri.flights.fly import FlightError, fly_plan
 from colibri.flights.folder import occupied, prepare
-from colibri.flights.plan import FlightPlan, FrameCount, Watcher
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.links.startup import COMPILING
 from colibri.mavlink.ulog.reader import FILE
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.progress import Progress
-
     from colibri.analysis.report import Report
 
 _UPDATES = 500
@@ -40,10 +37,16 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     prepare(plan.out)
     try:
         compile_first(args.profile, quiet=args.quiet)
-        with _Progress(plan, quiet=args.quiet, figures=not args.no_figures) as watcher:
+        with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
             for note in filter(None, (plan.track_note, in_words(plan.without_effect.items()))):
-                watcher.say(note)
-            summary = fly_plan(plan, watcher)
+                say(note)
+
+            def show(sim_time_s: float) -> None:
+                if plan.spec.link == "udp" and not args.no_figures:  # while two other processes fly
+                    import colibri.analysis.figures  # noqa: F401
+                progress(sim_time_s)
+
+            summary = fly_plan(plan, show, say, compiling)
     except FlightError as error:
         _keep_what_there_is(plan, str(error))
         if error.said:
@@ -95,70 +98,55 @@ def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool
     return found
 
 
-class _Progress(Watcher, AbstractContextManager["_Progress"]):
-    """Bars and lines on standard error; the slow imports happen on first use, or while other processes start."""
+Shown: TypeAlias = tuple[Callable[[float], None], Callable[[str], None], Callable[[int], None]]
 
-    def __init__(self, plan: FlightPlan, *, quiet: bool, figures: bool) -> None:
-        self._spec, self._quiet, self._figures = plan.spec, quiet, figures
-        self._first_s: float | None = None
-        self._due_s = 0.0
 
-    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
-        if self._quiet:
+@contextmanager
+def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
+    if quiet:
+        yield unseen, unseen, unseen
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TimeElapsedColumn
+
+    texts = ("{task.completed:6.1f} / {task.total:.1f} s", "{task.fields[speed]}")
+    columns = ("{task.description}", BarColumn(), *texts, TimeElapsedColumn())
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    bar = Progress(*columns, console=console, disable=not console.is_terminal)
+    task = bar.add_task(escape(plan.spec.track), total=plan.spec.duration, speed="", start=False)
+    counted = ("{task.completed} functions", BarColumn(), TimeElapsedColumn())
+    compiler = Progress(*counted, console=console, disable=not console.is_terminal, transient=True)
+    compilation = compiler.add_task("", total=None)
+    first_s: list[float] = []
+    due_s = 0.0
+
+    def show(sim_time_s: float) -> None:
+        nonlocal due_s
+        if sim_time_s < due_s:
             return
-        flight, functions = self._bars[1:]
-        if error is None:
-            flight.update(flight.task_ids[0], completed=self._spec.duration)
-        functions.stop()
-        flight.stop()
-
-    @cached_property
-    def _bars(self) -> "tuple[Console, Progress, Progress]":
-        """Of a flight, and of functions compiled before it."""
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.progress import BarColumn, Progress, TimeElapsedColumn
-
-        console = Console(stderr=True, highlight=False, soft_wrap=True)
-        texts = ("{task.completed:6.1f} / {task.total:.1f} s", "{task.fields[speed]}")
-        columns = ("{task.description}", BarColumn(), *texts, TimeElapsedColumn())
-        flight = Progress(*columns, console=console, disable=not console.is_terminal)
-        flight.add_task(escape(self._spec.track), total=self._spec.duration, speed="", start=False)
-        counted = ("{task.completed} functions", BarColumn(), TimeElapsedColumn())
-        functions = Progress(*counted, console=console, disable=not console.is_terminal, transient=True)
-        functions.add_task("", total=None)
-        return console, flight, functions
-
-    def starting(self) -> None:
-        if not self._quiet:
-            import rich.progress  # noqa: F401
-        if self._figures:
-            import colibri.analysis.figures  # noqa: F401
-
-    def flown(self, sim_time_s: float) -> None:
-        if self._quiet or sim_time_s < self._due_s:
-            return
-        self._due_s = sim_time_s + self._spec.duration / _UPDATES
-        flight, functions = self._bars[1:]
-        task = flight.task_ids[0]
-        if self._first_s is None:
-            functions.stop()
-            flight.start()  # not before something flies: an error of the start stands alone
-            flight.start_task(task)
-            self._first_s = sim_time_s
-        elapsed_s, flown_s = flight.tasks[task].elapsed or 0.0, sim_time_s - self._first_s
+        due_s = sim_time_s + plan.spec.duration / _UPDATES
+        if not first_s:
+            compiler.stop()
+            bar.start()  # not before something flies: an error of the start stands alone
+            bar.start_task(task)
+            first_s.append(sim_time_s)
+        elapsed_s, flown_s = bar.tasks[task].elapsed or 0.0, sim_time_s - first_s[0]
         speed = f"{flown_s / elapsed_s:.0f} × real time" if elapsed_s and flown_s else ""
-        flight.update(task, completed=sim_time_s, speed=speed)
+        bar.update(task, completed=sim_time_s, speed=speed)
 
-    def say(self, text: str) -> None:
-        if not self._quiet:
-            self._bars[0].print(text, markup=False)
+    def say(text: str) -> None:
+        console.print(text, markup=False)
 
-    def compiling(self, functions: int) -> None:
-        if self._quiet:
-            return
-        bar = self._bars[2]
-        if not bar.tasks[0].completed:
-            self.say(COMPILING)
-            bar.start()
-        bar.update(bar.task_ids[0], completed=functions)
+    def compiling(functions: int) -> None:
+        if not compiler.tasks[compilation].completed:
+            say(COMPILING)
+            compiler.start()
+        compiler.update(compilation, completed=functions)
+
+    try:
+        yield show, say, compiling
+        bar.update(task, completed=plan.spec.duration)
+    finally:
+        compiler.stop()
+        bar.stop()

@@ -1,13 +1,13 @@
 """Fly a plan over its link; over UDP as two processes."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from time import monotonic
 
 from colibri.common.errors import InFlightError, checked
 from colibri.common.process.failure_file import keep_failure, kept_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, loading
 from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
-from colibri.flights.plan import UNWATCHED, FlightPlan, FrameCount, PlanError, Watcher
+from colibri.flights.plan import FlightPlan, FrameCount, PlanError, unseen
 from colibri.flights.provenance import write_provenance
 from colibri.mavlink.ulog.log import TopicLog
 
@@ -25,8 +25,19 @@ class FlightError(InFlightError):
         self.code, self.said = code, said
 
 
-def fly_plan(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog | None = None) -> FrameCount:
+def fly_plan(
+    plan: FlightPlan,
+    progress: Callable[[float], None] = unseen,
+    say: Callable[[str], None] = unseen,
+    compiling: Callable[[int], None] = unseen,
+    topics: TopicLog | None = None,
+) -> FrameCount:
     """Fly a plan over its link and write its provenance; with `topics` no files are written.
+
+    Args:
+        progress: Called with the simulated time, s.
+        say: Called with a line per ground link and ground station.
+        compiling: Called with the number of functions compiled so far.
 
     Raises:
         FlightError: The flight ended early; the reason is also in `FAILURE`.
@@ -35,21 +46,26 @@ def fly_plan(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog | 
     if topics is None:
         write_provenance(plan)
     if plan.spec.link == "udp":
-        return fly_processes(plan, watcher)
+        return fly_processes(plan, progress, say, compiling)
     with loading():
         from colibri.common.jit import on_compile
         from colibri.flights.in_process import fly_locally
 
-    if watcher is not UNWATCHED:
-        on_compile(watcher.compiling)
+    if compiling is not unseen:
+        on_compile(compiling)
     try:
-        return fly_locally(plan, watcher, topics)
+        return fly_locally(plan, progress, topics)
     except InFlightError as error:
         folder = plan.out if topics is None else None
         raise FlightError(keep_failure(error, folder)) from error
 
 
-def fly_processes(plan: FlightPlan, watcher: Watcher = UNWATCHED) -> FrameCount:
+def fly_processes(
+    plan: FlightPlan,
+    progress: Callable[[float], None] = unseen,
+    say: Callable[[str], None] = unseen,
+    compiling: Callable[[int], None] = unseen,
+) -> FrameCount:
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     summary: FrameCount | None = None
@@ -64,19 +80,18 @@ def fly_processes(plan: FlightPlan, watcher: Watcher = UNWATCHED) -> FrameCount:
                 if kind == "compiling":
                     silent.end()
                     compiled[child.name] = event["functions"]
-                    watcher.compiling(sum(compiled.values()))
+                    compiling(sum(compiled.values()))
                 elif child.name == "autopilot":
                     if kind in _SHOWN:
-                        watcher.say(event["text"])
+                        say(event["text"])
                 elif kind == "listening":
                     autopilot = plan.autopilot_spec(event["url"].replace("udpin", "udpout"))
                     children["autopilot"] = Child(autopilot, fork=True)
-                    watcher.starting()
                 elif kind == "progress":
-                    watcher.flown(event["sim_time_s"])
+                    progress(event["sim_time_s"])
                 elif kind in ("silence", "answered"):
                     if not compiled:  # which takes long, and is shown
-                        watcher.say(event["text"])
+                        say(event["text"])
                     (silent.begin if kind == "silence" else silent.end)()
                 elif kind == "ended":
                     summary = FrameCount(event["wall_time_s"], event["frames"], event["resent"])

@@ -1,5 +1,6 @@
 """A flight in this process, over link `memory` or `direct`."""
 
+from collections.abc import Callable
 from math import isfinite
 from time import perf_counter, sleep
 
@@ -12,7 +13,7 @@ from colibri.autopilot.process.recorded_inputs import setup_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading
 from colibri.flights.flight import Direct, InMemory, SteppedFlight, Wire
-from colibri.flights.plan import UNWATCHED, FlightPlan, FrameCount, Watcher
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 from colibri.plant.physics.start import nudged
@@ -20,7 +21,9 @@ from colibri.plant.process.reports import TruthLog
 from colibri.plant.simulation.plant import Plant, PlantBuilder
 
 
-def fly_locally(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog | None = None) -> FrameCount:
+def fly_locally(
+    plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
+) -> FrameCount:
     """Record in `topics`, or else in the plan's folder."""
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
@@ -42,7 +45,7 @@ def fly_locally(plan: FlightPlan, watcher: Watcher = UNWATCHED, topics: TopicLog
                 log.write(sample.step, sample.datagram)
                 truth.write_world(sample.world)
                 frames += 1
-                watcher.flown(sample.world.time_us / 1e6)
+                progress(sample.world.time_us / 1e6)
                 if isfinite(plan.spec.pace):
                     sleep(max(0.0, began_s + sample.world.time_us / 1e6 / plan.spec.pace - perf_counter()))
             log.flush()

@@ -30,16 +30,8 @@ _loaded = lru_cache(maxsize=16)(load_track)
 """Flights that differ in seed, wind or start alone share their track."""
 
 
-class Watcher:
-    """Is told that processes start, of time flown, of lines of ground links, of functions compiled; ignores all."""
-
-    def starting(self) -> None: ...
-    def flown(self, sim_time_s: float) -> None: ...
-    def say(self, text: str) -> None: ...
-    def compiling(self, functions: int) -> None: ...
-
-
-UNWATCHED = Watcher()
+def unseen(_what: object) -> None:
+    """Ignore progress."""
 
 
 class FrameCount(NamedTuple):

@@ -5,7 +5,7 @@ from math import nan
 
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.mavlink.parameters.store import Parameters, Value
-from colibri.mavlink.telemetry.snapshot import CHARGE_OK, TelemetrySnapshot
+from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, TelemetrySnapshot
 from colibri.mavlink.ulog import messages, topics
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import split
@@ -72,15 +72,7 @@ class Recorder:
         self._log.flush()
         self._log.append(status_message(now_us, status, self._system_id, len(s.controls)))
         if s.battery is not None and self._with_battery:
-            battery, warning = s.battery, max(s.battery.charge_state - CHARGE_OK, 0)
-            taken = (
-                battery.voltage_v,
-                battery.current_a,
-                1e3 * battery.used_ah,
-                battery.remaining,
-                battery.remaining_s,
-            )
-            self._log.append(messages.SYNC + record(topics.BATTERY, now_us, *taken, True, battery.cells, warning))
+            self._log.append(battery_message(now_us, s.battery))
 
 
 def sample_row(s: TelemetrySnapshot) -> tuple[float, ...]:
@@ -98,3 +90,9 @@ def sample_row(s: TelemetrySnapshot) -> tuple[float, ...]:
         nan if solver.iterations < 0 else solver.iterations,
         *others,
     )
+
+
+def battery_message(time_us: int, battery: BatteryState) -> bytes:
+    taken = (battery.voltage_v, battery.current_a, 1e3 * battery.used_ah, battery.remaining, battery.remaining_s)
+    warning = max(battery.charge_state - CHARGE_OK, 0)
+    return messages.SYNC + record(topics.BATTERY, time_us, *taken, True, battery.cells, warning)

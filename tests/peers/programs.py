@@ -18,10 +18,10 @@ def can_be_alone() -> bool:
 
 
 def program_of(whom: str) -> Path:
-    """Return the program that an environment variable names, if it can be run alone; else skip the test."""
+    """Return the program that an environment variable names, alone; without a name, skip the test."""
     path = os.environ.get(PROGRAMS[whom])
     if not path:
         pytest.skip(f"{PROGRAMS[whom]} is not set: the path of {whom}")
     if not can_be_alone():
-        pytest.skip(f"unshare --map-root-user --net is not permitted: {whom} would not be alone on its ports")
+        pytest.fail(f"unshare --map-root-user --net is not permitted: {whom} would not be alone on its ports")
     return Path(path)

@@ -157,6 +157,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
         self._model, self._airframe = self._mpc.model["airframe"], airframe_of(vehicle)
+        self._model_kg = self._model["mass_kg"]
 
     def warm_up(self) -> None:
         """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""
@@ -222,8 +223,9 @@ class LpvMpc(AttitudeController[LawMemory]):
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
         observed = self.tracker.observe(tracked, state)
-        self._model["mass_kg"] = observed.mass_kg
-        if observed.estimate.size > ESTIMATES:
+        if observed.estimate.size == ESTIMATES:
+            self._model_kg[0] = observed.mass_kg
+        else:
             self._model[0] = with_learned(self._airframe, observed.mass_kg, observed.estimate[ESTIMATES:])
         expected = (
             memory.plan.states[memory.age :, PREDICTED:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]

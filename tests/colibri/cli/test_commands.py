@@ -2,7 +2,6 @@ import json
 import os
 import resource
 import shlex
-import shutil
 import subprocess
 import sys
 from contextlib import redirect_stdout
@@ -87,7 +86,6 @@ def bash_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return script
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 @pytest.mark.parametrize(
     ("words", "completed"),
     [

@@ -9,17 +9,20 @@ from colibri.common.process.lifecycle import freeze_once, gc_frozen, loading
 
 PROGRAM = """
 import atexit, gc
-from colibri.common.process.lifecycle import end_quickly
+from colibri.common.process.lifecycle import end_quickly, loading
 
 atexit.register(lambda: print(gc.get_freeze_count() > 0))
 end_quickly()
 print(gc.get_freeze_count() > 0)
+with loading():
+    kept = [[]]
+print(any(each is kept for each in gc.get_objects(generation=2)))
 """
 
 
-def test_what_is_loaded_is_not_looked_through_at_the_end() -> None:
+def test_loaded_objects_are_old_at_once_and_not_looked_through_at_the_end() -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "True"]
+    assert done.stdout.split() == ["False", "True", "True"]
 
 
 @pytest.mark.parametrize("enabled", [True, False])
