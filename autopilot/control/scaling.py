@@ -6,6 +6,7 @@ ratios give the numbers to which the laws were tuned on the Hummingbird. In the 
     thrust  largest thrust, in parts of the weight, with a full battery under load
     climb   g (thrust / 1.1 - 1): acceleration upwards that is left with a tenth more mass; at least a quarter of that
             without it, g (thrust - 1) / 4
+    across  g √((thrust / 1.1)² - 1): the same sideways, at a constant height
     turn    angular acceleration in hover, about x, y, z, rad/s²
     slow    the slower of the rotors' lags in parts of `lag_s`, at least 1
     lift    moment of one rotor's lift in hover, N m
@@ -24,6 +25,7 @@ from colibri.plant.vehicle.description import Vehicle
 _LEAST_THRUST = 1.05
 _PAYLOAD = 1.1
 _LEAST_CLIMB = 0.25
+_ACROSS = 0.75
 
 
 class LpvMpcScaling(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -66,6 +68,7 @@ class Capability(NamedTuple):
 
     thrust: float
     climb_m_s2: float
+    across_m_s2: float
     turn_rad_s2: tuple[float, float, float]
     lag_s: float
     lift_n_m: float
@@ -89,7 +92,8 @@ def capability_of(vehicle: Vehicle) -> Capability:
     x, y, z = turns.tolist()
     thrust, lift_n_m = most / hover, weight_n / len(rotors.position_m) * lever_m
     climb_m_s2 = gravity * max(thrust / _PAYLOAD - 1.0, _LEAST_CLIMB * (thrust - 1.0))
-    return Capability(thrust, climb_m_s2, (x, y, z), lag_s, lift_n_m, gravity)
+    across_m_s2 = gravity * sqrt(max(square(thrust / _PAYLOAD) - 1.0, 0.0))
+    return Capability(thrust, climb_m_s2, across_m_s2, (x, y, z), lag_s, lift_n_m, gravity)
 
 
 def sagging_speed(vehicle: Vehicle) -> float:
@@ -119,9 +123,16 @@ def _led_lag(vehicle: Capability, ratios: GeometricScaling) -> float:
     return 0.5 * _slowed("lag_s", 0.75)(vehicle, ratios) if vehicle.lag_s > ratios.lag_s else 0.0
 
 
+def _most(vehicle: Capability, ratios: LpvMpcScaling) -> float:
+    return float(ratios.max_g * vehicle.gravity_m_s2 / sqrt(_slow(vehicle, ratios)))
+
+
+def _climb(vehicle: Capability, ratios: LpvMpcScaling) -> float:
+    return min(ratios.acceleration * vehicle.climb_m_s2, _most(vehicle, ratios))
+
+
 def _acceleration(vehicle: Capability, ratios: LpvMpcScaling) -> float:
-    most = ratios.max_g * vehicle.gravity_m_s2 / sqrt(_slow(vehicle, ratios))
-    return min(ratios.acceleration * vehicle.climb_m_s2, most)
+    return max(_climb(vehicle, ratios), min(_ACROSS * vehicle.across_m_s2, _most(vehicle, ratios)))
 
 
 def _approach_speed(vehicle: Capability, ratios: LpvMpcScaling) -> float:
@@ -135,7 +146,10 @@ def _max_rate(vehicle: Capability, ratios: LpvMpcScaling) -> list[float]:
 
 _LPV_MPC = {
     "guidance.poles": ScalingRule("poles / √slow", _slowed("poles", -0.5)),
-    "guidance.max_acceleration_m_s2": ScalingRule("acceleration × climb, at most max_g × g / √slow", _acceleration),
+    "guidance.max_climb_m_s2": ScalingRule("acceleration × climb, at most max_g × g / √slow", _climb),
+    "guidance.max_acceleration_m_s2": ScalingRule(
+        "at least max_climb_m_s2 and ¾ across, at most max_g × g / √slow", _acceleration
+    ),
     "guidance.approach_speed_m_s": ScalingRule("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
     "observer.acceleration_rad_s": ScalingRule("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
     "observer.moment_rad_s": ScalingRule("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),

@@ -24,6 +24,7 @@ TABLE = load_profile("flight").table("lpv-mpc")
         ("r26", "no lag", 1e-3),
         ("heavy30", "hover", 0.02),
         ("cf21", "at 5 m/s", 0.01),
+        ("heavy30", "at 12 m/s", 1e-3),
     ],
 )
 def test_every_vehicle_flies_by_its_file_alone(vehicle: str, trial: str, rms_m: float) -> None:

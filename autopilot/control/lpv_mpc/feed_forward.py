@@ -24,6 +24,7 @@ HEADING_ABOVE = 0.15  # least vertical part of body z at which the yaw has a mea
 _TWIST_RAD_S = 4.0  # of the return to it
 _STRONG_WIND = 0.2  # horizontal force, in parts of the weight, beyond which errors of velocity count as distances
 _STOP_S, _MAX_STOP_S, _IN_GUSTS_M_S = 10.0, 2.0, 0.3  # for each part beyond; at most; error that does not count
+_CATCH_UP_S = 1.0  # in which an error of velocity is made good, within the accelerations
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
@@ -35,6 +36,7 @@ class Approach(NamedTuple):
     max_error_m: float  # of approach
     follow_within_m: float  # impossible motion of farther references counts in proportion
     max_acceleration_m_s2: float  # of a decaying error
+    max_climb_m_s2: float  # the same upwards, and for small errors of velocity
     exact_within_m: float  # nearer references are tracked directly
     interval_s: float
     recovery_1_s2: float  # gains of the recovery, slower than plans
@@ -338,7 +340,8 @@ def approach(
         else:
             error[i] = away[i]
         error_rate[i] = part * references[1][0, i] + drift[i] - velocity[i]
-    slower = slowed_by(norm(error), norm(error_rate), law)
+    most_m_s2 = min(max(sqrt(late) / _CATCH_UP_S, law.max_climb_m_s2), law.max_acceleration_m_s2)
+    slower = slowed_by(error, error_rate, most_m_s2, law)
     k1, k2 = law.k1_s2 / (slower * slower), law.k2_s / slower
     for i in range(3):
         left, left_rate = smooth * error[i], smooth * error_rate[i]
@@ -380,9 +383,13 @@ def stopping_s(disturbance: Disturbance, vehicle: Packed) -> float:
 
 
 @compiled
-def slowed_by(error_m: float, error_rate_m_s: float, law: Approach) -> float:
-    half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
-    return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
+def slowed_by(error: Array, rate: Array, most_m_s2: float, law: Approach) -> float:
+    steep = most_m_s2 / law.max_climb_m_s2  # vertical errors count so much more
+    up, up_rate = steep * error[2], steep * rate[2]
+    error_m = sqrt(error[0] * error[0] + error[1] * error[1] + up * up)
+    rate_m_s = sqrt(rate[0] * rate[0] + rate[1] * rate[1] + up_rate * up_rate)
+    half = 0.5 * law.k2_s * rate_m_s / most_m_s2
+    return max(half + sqrt(half * half + law.k1_s2 * error_m / most_m_s2), 1.0)
 
 
 @compiled

@@ -66,6 +66,8 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     approach_speed_m_s: Positive
     follow_within_m: Positive = 0.54
     max_acceleration_m_s2: Positive
+    max_climb_m_s2: Positive | None = None
+    """Its upward part; None: no less."""
     exact_within_m: Positive = 0.3
     max_tilt_deg: Degrees
     min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
@@ -135,12 +137,14 @@ class LpvMpc(AttitudeController[LawMemory]):
             self._span_n = min(self._span_n, 1.0 / float(self._mpc.from_wrench[:, 0].max()))
         self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
         k1_s2, k2_s = gains(settings.guidance.poles)
+        most_m_s2 = settings.guidance.max_acceleration_m_s2
         guidance = Approach(
             k1_s2,
             k2_s,
             settings.guidance.approach_speed_m_s * k2_s / k1_s2,
             settings.guidance.follow_within_m,
-            settings.guidance.max_acceleration_m_s2,
+            most_m_s2,
+            min(settings.guidance.max_climb_m_s2 or most_m_s2, most_m_s2),
             settings.guidance.exact_within_m,
             h,
             *gains(settings.fallback.poles),

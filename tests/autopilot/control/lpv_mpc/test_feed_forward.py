@@ -31,6 +31,7 @@ GUIDANCE = Approach(
     max_error_m=1.1,
     follow_within_m=1.1,
     max_acceleration_m_s2=10.0,
+    max_climb_m_s2=10.0,
     exact_within_m=0.3,
     interval_s=INTERVAL_S,
     recovery_1_s2=30.0,
