@@ -72,8 +72,7 @@ def fit(log: RateLog) -> Fit:
     lags, compared = np.where(found.lags_s < _LEAST_LAG_S, 0.0, found.lags_s), measured[_LATENCIES:]
     modelled = np.stack([_late(_lagged(commands[:, axis], *lags[axis]), found.late) for axis in range(3)], axis=1)
     modelled += (compared - modelled).mean(axis=0)
-    latency_s = found.late * _GRID_S
-    return Fit(lags[:, 0], lags[:, 1], latency_s, explained, grid[_LATENCIES:], modelled, compared)
+    return Fit(lags[:, 0], lags[:, 1], found.late * _GRID_S, explained, grid[_LATENCIES:], modelled, compared)
 
 
 class _Found(NamedTuple):
@@ -97,9 +96,13 @@ def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Fou
 
 
 def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[float, float]) -> Array:
+    """Return the unexplained part of the variance at each latency: var(a - b) = var(a) + var(b) - 2 cov(a, b)."""
     modelled, compared = _lagged(commands[:, axis], *lags_s), measured[_LATENCIES:, axis]
-    left = np.array([(compared - _late(modelled, late)).var() for late in range(_LATENCIES)])
-    return left / max(float(compared.var()), 1e-12)
+    compared, count = compared - compared.mean(), len(compared)
+    sums = np.cumsum([np.append(0.0, modelled), np.append(0.0, modelled**2)], axis=1)
+    means, squares = (sums[:, count:] - sums[:, :-count]) / count
+    left: Array = squares - means**2 + compared.var() - 2.0 / count * np.correlate(modelled, compared)
+    return left[:0:-1] / max(float(compared.var()), 1e-12)
 
 
 def _refined(
@@ -147,13 +150,10 @@ def _second_order(lag_s: float, behind_s: float) -> tuple[Array, Array]:
     return np.array([0.0, first, last]), np.array([1.0, -(u + v).real, (u * v).real])
 
 
-_AXES = ("p", "q", "r")
-
-
 def draw(fit: Fit, path: Path) -> None:
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     t = fit.grid_s - fit.grid_s[0]
-    for axis, (name, plot) in enumerate(zip(_AXES, figure.subplots(3, 1, sharex=True), strict=True)):
+    for axis, (name, plot) in enumerate(zip("pqr", figure.subplots(3, 1, sharex=True), strict=True)):
         plot.plot(t, fit.measured[:, axis], label="measured", linewidth=1.0)
         plot.plot(t, fit.modelled[:, axis], label=f"lag of order {fit.order}", linewidth=1.0)
         lag_ms, explained = 1e3 * fit.time_constant_s[axis], 100.0 * fit.explained[axis]
