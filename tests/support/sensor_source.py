@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.common.earth.magnetic_field import field_enu_gauss
@@ -188,11 +189,9 @@ def _pressures(motion: Motion, sensors: Sensors, dt: float, chance: np.random.Ge
 def gauss_markov(count: int, axes: int, dt: float, sigma: float, time_s: float, chance: np.random.Generator) -> Array:
     """Return a first-order Gauss-Markov process, (count, axes), stationary from its beginning."""
     decay = exp(-dt / time_s)
-    white = chance.normal(size=(count, axes)) * sigma
-    process = np.empty((count, axes))
-    process[0] = white[0]
-    for k in range(1, count):
-        process[k] = decay * process[k - 1] + sqrt(1.0 - decay * decay) * white[k]
+    steps = chance.normal(size=(count, axes)) * sigma
+    steps[1:] *= sqrt(1.0 - decay * decay)
+    process: Array = lfilter([1.0], [1.0, -decay], steps, axis=0)
     return process
 
 

@@ -86,7 +86,7 @@ THEIRS = ("spiral", "--controller", "their-name", "--link")
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
     assert len(EXAMPLE.splitlines()) <= 36
-    fly_as_a_user(LAW, EXAMPLE, tmp_path, *THEIRS, link, "--duration", "40")
+    fly_as_a_user(LAW, EXAMPLE, tmp_path, *THEIRS, link, "--duration", "25")
     figures = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert figures["controller"] == "their-name"
     assert figures["rmse_after_20s_m"] < 0.5

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
-from colibri.certification.attitude import CertifiedConditions
+from colibri.certification.attitude import CertifiedConditions, attitude_loop
 from colibri.certification.certificate import Certificate, ProofEntry
+from colibri.certification.loop import UncertainLoop
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import HELD_RAD, PlanFlyer, PlannedAttitude
 from colibri.certification.report import CERTIFICATE, FIGURE, Interval, fly, integrate
@@ -39,6 +41,11 @@ def test_the_certificate_is_confirmed_in_exact_arithmetic() -> None:
     assert min(margins.values()) > 0.0
 
 
+@cache
+def exact_loop() -> UncertainLoop:
+    return attitude_loop(CERTIFIED.invariant.numbers, certificates.exactly)
+
+
 def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
     P = proof.P.copy()
     P[i, j] *= factor
@@ -46,25 +53,26 @@ def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
 
 
 @pytest.mark.parametrize(
-    ("what", "spoil"),
+    ("margin", "spoil"),
     [
-        ("decrease", lambda proof: spoilt(proof, 1, 1, 1.1)),
-        pytest.param("decrease", lambda proof: spoilt(proof, 0, 1, 1.0 + 1e-12), marks=pytest.mark.long),
-        ("disturbance", lambda proof: proof._replace(multipliers=1.001 * proof.multipliers)),
-        pytest.param("limits", lambda proof: proof._replace(P=0.999 * proof.P), marks=pytest.mark.long),
+        (certificates.decrease_margin, lambda proof: spoilt(proof, 1, 1, 1.1)),
+        (certificates.decrease_margin, lambda proof: spoilt(proof, 0, 1, 1.0 + 1e-12)),
+        (certificates.supply_margin, lambda proof: proof._replace(multipliers=1.001 * proof.multipliers)),
+        (certificates.limit_margin, lambda proof: proof._replace(P=0.999 * proof.P)),
     ],
     ids=["P unlike", "P not symmetric", "larger multipliers", "larger set"],
 )
-def test_a_certificate_that_was_tampered_with_is_not_confirmed(what: str, spoil: Callable[[Proof], Proof]) -> None:
-    _, numbers, proof, _ = CERTIFIED.invariant
-    assert certificates.margins_of("invariant", numbers, spoil(proof))[what] <= 0.0
+def test_a_certificate_that_was_tampered_with_is_not_confirmed(
+    margin: Callable[[UncertainLoop, Proof], float], spoil: Callable[[Proof], Proof]
+) -> None:
+    assert margin(exact_loop(), spoil(CERTIFIED.invariant.proof)) <= 0.0
 
 
 @pytest.mark.parametrize(("name", "factor"), [("commanded", 0.8), ("unsure", 4.0)])
 def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(name: str, factor: float) -> None:
     _, numbers, proof, _ = CERTIFIED.invariant
     other = numbers._replace(**{name: (factor * np.array(getattr(numbers, name))).tolist()})
-    assert certificates.margins_of("invariant", other, proof)["decrease"] == 0.0
+    assert certificates.decrease_margin(attitude_loop(other, certificates.exactly), proof) == 0.0
 
 
 @pytest.mark.long
@@ -75,16 +83,13 @@ def test_every_part_of_it_is_confirmed(part: str) -> None:
 
 
 @pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
-def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
-    flown = fly(FLIGHT, CERTIFIED.invariant, flights, 1.0, seed=1)
+def test_flights_from_its_border_stay_and_tend_to_the_attractor(flights: int) -> None:
+    """At least as fast as is certified."""
+    flown, proof = fly(FLIGHT, CERTIFIED.invariant, flights, 1.0, seed=1), CERTIFIED.attractor.proof
     assert flown.values.shape[1] == flights
     assert flown.values[0] == pytest.approx(np.ones(flights))
     assert flown.values.max() <= 1.0
-
-
-def test_flights_tend_to_what_is_certified_at_least_as_fast() -> None:
-    states, proof = (fly(FLIGHT, CERTIFIED.invariant, 50, 0.5, seed=2).states, CERTIFIED.attractor.proof)
-    values = np.einsum("tfi,ij,tfj->tf", states, proof.P, states)
+    values = np.einsum("tfi,ij,tfj->tf", flown.states, proof.P, flown.states)
     assert (values[1:] <= proof.ratio * values[:-1] + 1.0 - proof.ratio + 1e-9).all()
 
 

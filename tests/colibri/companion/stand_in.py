@@ -30,25 +30,15 @@ _NO_COVARIANCE = (nan,) + (0.0,) * 20
 
 @dataclass(kw_only=True)
 class Numbers:
-    """What a stand-in's vehicle is really like.
+    """What a stand-in's vehicle is really like."""
 
-    Attributes:
-        hover_signal: The motors' signal, 0..1, that carries the weight; thrust goes with its square.
-        lag_s: Of body rates.
-        late_s: Before a command has any effect.
-        thrust_lag_s: Of the motors.
-        push_m_s2: Of the wind, ENU.
-        natural_rad_s: Of roll and pitch rates that overshoot, a second order; 0 for the lag alone.
-        damping: Of that.
-    """
-
-    hover_signal: float = 0.6
-    lag_s: tuple[float, float, float] = (0.045, 0.045, 0.15)
-    late_s: float = 0.008
+    hover_signal: float = 0.6  # of the motors, 0..1, carries the weight; thrust goes with its square
+    lag_s: tuple[float, float, float] = (0.045, 0.045, 0.15)  # of body rates
+    late_s: float = 0.008  # before a command has any effect
     thrust_lag_s: float = 0.025
-    push_m_s2: tuple[float, float, float] = (0.4, -0.2, 0.0)
-    natural_rad_s: float = 0.0
-    damping: float = 0.5
+    push_m_s2: tuple[float, float, float] = (0.4, -0.2, 0.0)  # of the wind, ENU
+    natural_rad_s: float = 0.0  # of roll and pitch rates that overshoot, a second order; 0 for the lag alone
+    damping: float = 0.5  # of that
 
 
 @dataclass(kw_only=True)

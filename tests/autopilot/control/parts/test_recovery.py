@@ -54,11 +54,13 @@ def test_too_much_tilting_moment_keeps_its_direction() -> None:
 @settings(max_examples=15)
 @given(quaternions(), vectors(10.0))
 def test_the_thrust_axis_gets_where_it_must_point(q: Quaternion, rate: Vector) -> None:
-    omega, attitude, h = np.array(rate), q, 1e-3
+    (ix, iy, iz), omega, attitude, h = INERTIA, np.array(rate), q, 1e-3
     for _ in range(3000):
         direction = np.array(rotation_matrix(attitude)).T @ [0.0, 0.0, 1.0]
         moment = turning_moment(direction, omega, INERTIA, GAINS)
-        omega = omega + h * (moment - np.cross(omega, INERTIA * omega)) / INERTIA
+        p, r, s = omega
+        gyroscopic = [(iz - iy) * r * s, (ix - iz) * s * p, (iy - ix) * p * r]
+        omega = omega + h * (moment - gyroscopic) / INERTIA
         w, x, y, z = attitude
         p, r, s = 0.5 * h * omega
         attitude = normalized(
