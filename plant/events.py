@@ -72,7 +72,7 @@ class Motor(TimedEvent, frozen=True, tag="motor"):
     """Leave a rotor, from 1 (0: all), this fraction of its thrust: 0 is lost, 1 is normal again."""
 
     FORM = "ROTOR,FRACTION"
-    rotor: Annotated[int, msgspec.Meta(ge=0, le=faults.MOTORS)]
+    rotor: Annotated[int, msgspec.Meta(ge=0)]
     fraction: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
 
     @property
@@ -147,7 +147,8 @@ def check_events(events: Iterable[Event], vehicle: Vehicle, *, on_sensors: bool,
                 f"event {each.kind} at t = {each.t:g} s needs ground stations: fly it by colibri fly --gcs, by colibri "
                 "sitl or, in pytest, with the mark sitl"
             )
-        judged = faults.judged(each.change, parts) if isinstance(each, Failure | Motor) else None
+        rotors = vehicle.rotors.count
+        judged = faults.judged(each.change, parts, rotors) if isinstance(each, Failure | Motor) else None
         if isinstance(judged, Refusal):
             raise EventError(f"event {each.kind} at t = {each.t:g} s: {judged.reason}")
 

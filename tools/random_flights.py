@@ -117,7 +117,7 @@ def _failure(chance: random.Random, feedback: str) -> RandomEvent:
     usual = [it.usual for it in row.values]
     times = chance.choice((1.0, 2.0 ** chance.uniform(-2.0, 4.0)))
     values = [min(max(it.usual * times, it.minimum), it.maximum) for it in row.values] if any(usual) else usual
-    instance = float(chance.randint(1, row.instances))
+    instance = float(chance.randint(1, faults.MOTORS if row.unit == faults.MOTOR else 1))
     return RandomEvent(after_s, "inject", (faults.unit_name(row.unit), faults.kind_name(row.kind), instance, *values))
 
 

@@ -84,7 +84,7 @@ def parts_of(
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
     defence = Defence(pilot, lines.say, strict=strict)
     stations = Stations(
-        *(settings, pilot, missions, fence, lines, parameters, vehicle.name, tasks, conventions),
+        *(settings, pilot, missions, fence, lines, parameters, vehicle, tasks, conventions),
         takes_attitude=attitude is not None,
         defence=defence,
         budget=budget,

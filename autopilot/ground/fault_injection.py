@@ -1,6 +1,6 @@
 """MAV_CMD_INJECT_FAILURE, forwarded to the plant and acknowledged with its result."""
 
-from colibri.mavlink.hil.faults import Equipment, Fault, fault_from, judged
+from colibri.mavlink.hil.faults import MOTORS, Equipment, Fault, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.hil.world_changes import WorldChange
@@ -13,8 +13,8 @@ ANSWERED_WITHIN_US = 1_000_000  # the result is normally in the frame after next
 class Failures:
     """Forwards faults to the plant, and its results back."""
 
-    def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        self._relays = relays
+    def __init__(self, feedback: Feedback, *, relays: bool, motors: int = MOTORS) -> None:
+        self._relays, self._motors = relays, motors
         self._parts = [part for part in Equipment if part is not Equipment.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault | WorldChange] = []
         self._pending: tuple[Fault, ReceivedCommand] | None = None
@@ -35,7 +35,7 @@ class Failures:
         """Have the plant change without an answer."""
         if not self._relays:
             return Refusal("this simulator does not change", UNSUPPORTED)
-        judgement = judged(asked, self._parts) if isinstance(asked, Fault) else asked
+        judgement = judged(asked, self._parts, self._motors) if isinstance(asked, Fault) else asked
         if isinstance(judgement, Refusal):
             return judgement
         self._to_send.append(judgement)

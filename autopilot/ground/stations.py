@@ -52,6 +52,7 @@ from colibri.mavlink.telemetry.snapshot import HomePosition, TelemetrySnapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
+from colibri.plant.vehicle.description import Vehicle
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -105,7 +106,7 @@ class Stations:
         fence: Fence,
         lines: StatusQueue,
         parameters: Parameters,
-        vehicle_name: str,
+        vehicle: Vehicle,
         tasks: ModeTasks,
         conventions: Conventions,
         *,
@@ -118,7 +119,7 @@ class Stations:
         self._text, self.reports = StatusText(), settings.reports
         self.banner = conventions.banner
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
-        self.failures = Failures(settings.feedback, relays=settings.relays_faults)
+        self.failures = Failures(settings.feedback, relays=settings.relays_faults, motors=vehicle.rotors.count)
         self.offboard = Offboard(self._text, conventions.frames or LOCAL_FRAMES)
         self._follow = Follow(self._text)
         self.manual = Manual(settings.system_id, self._text)
@@ -135,12 +136,12 @@ class Stations:
         self.exempt, self.takeoff_by_stick = commands.exempt, commands.motion.takeoff_by_stick
         rules = {MISSION: conventions.mission_rules, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
         executor, guided_goto = missions.executor, commands.motion.guided_goto
-        vehicle = MissionVehicle(self._load, lambda: executor.progress, executor.set_current, guided_goto)
+        on_mission = MissionVehicle(self._load, lambda: executor.progress, executor.set_current, guided_goto)
         if wire.home_first:
             missions.boot_unix_us = settings.boot_unix_us
-            vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
+            on_mission = on_mission._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
         self.plans = MissionService(
-            rules, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
+            rules, on_mission, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
         )
         self.heartbeat = HeartbeatService(wire)
         encoders = streams.chosen(telemetry(settings.boot_unix_us))
@@ -186,7 +187,7 @@ class Stations:
         )
         self._logged: TelemetrySnapshot | None = None
         program = self.banner[0] if self.banner else ""
-        logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, program, settings.boot_unix_us)
+        logged = LoggedVehicle(vehicle.name, settings.system_id, parameters, program, settings.boot_unix_us)
         self.log = OnboardLog(logged, files, logs)
 
     def _load(self, plan_type: int, plan: StoredPlan) -> None:

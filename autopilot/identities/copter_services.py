@@ -359,7 +359,7 @@ def _world(values: Parameters, latitude_deg: float) -> dict[str, Fault | WorldCh
     return found
 
 
-_MOTORS = 4
+_MOTORS = 8
 _WORLD_AT_REST: dict[str, Fault | WorldChange] = {
     "SPEEDUP": PaceChange(1.0),
     "WIND": WindChange(0.0, 180.0),

@@ -304,7 +304,7 @@ class Sitl(View, Stepped, Steered):
         if fault.unit in faults.SENSORS and self.setting.feedback is not Feedback.SENSORS:
             return f'feedback is "{self.setting.feedback}", and sensors are not used: set feedback="sensors"'
         p4, p5, p6, p7 = (*map(float, values), *(0.0,) * 4)[:4]
-        judgement = faults.judged(fault._replace(values=(p4, p5, p6, p7)), tuple(faults.Equipment))
+        judgement = faults.judged(fault._replace(values=(p4, p5, p6, p7)), tuple(faults.Equipment), self.setting.rotors)
         missing = f"the vehicle has no {faults.short_unit_name(fault.unit)}"
         return judgement.reason if isinstance(judgement, Refusal) else missing
 

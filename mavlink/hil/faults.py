@@ -67,7 +67,6 @@ class FaultRow(NamedTuple):
     part: Equipment
     meaning: str
     values: tuple[Value, ...] = ()
-    instances: int = 1  # number of units
 
 
 def _scalar(name: str, unit: str, minimum: float, maximum: float, usual: float) -> Value:
@@ -117,13 +116,12 @@ ROWS: tuple[FaultRow, ...] = (
             Value("factor of the resistance", "1", 0.1, 10.0, 1.0, 1.0),
         ),
     ),
-    FaultRow(MOTOR, OK, Equipment.ROTORS, "normal again", instances=MOTORS),
-    FaultRow(MOTOR, OFF, Equipment.ROTORS, "lost: undriven, runs down", instances=MOTORS),
-    FaultRow(MOTOR, STUCK, Equipment.ROTORS, "keeps its present speed", instances=MOTORS),
+    FaultRow(MOTOR, OK, Equipment.ROTORS, "normal again"),
+    FaultRow(MOTOR, OFF, Equipment.ROTORS, "lost: undriven, runs down"),
+    FaultRow(MOTOR, STUCK, Equipment.ROTORS, "keeps its present speed"),
     FaultRow(
         *(MOTOR, WRONG, Equipment.ROTORS, "weak: a fraction of thrust and torque"),
         values=(_scalar("remaining fraction", "1", 1e-3, 1.0, 0.65),),
-        instances=MOTORS,
     ),
 )
 TABLE: Mapping[tuple[int, int], FaultRow] = {(row.unit, row.kind): row for row in ROWS}
@@ -176,7 +174,7 @@ def judged(fault: Fault, parts: Collection[Equipment], motors: int = MOTORS) -> 
     if row.part not in parts:
         without = "flown by the state, not by sensors" if row.part is Equipment.SENSORS else f"no {row.part} to fail"
         return Refusal(without, RESULT_UNSUPPORTED)
-    instances = motors if row.unit == MOTOR else row.instances
+    instances = motors if row.unit == MOTOR else 1
     if not 0 <= fault.instance <= instances:
         return Refusal(f"instance must be 0 to {instances}")
     return _with_values(row, fault)

@@ -22,13 +22,13 @@ def asked(*params: float, now_us: int = 0) -> ReceivedCommand:
 
 @pytest.fixture
 def failures() -> Failures:
-    return Failures(Feedback.SENSORS, relays=True)
+    return Failures(Feedback.SENSORS, relays=True, motors=6)
 
 
 def test_a_fault_is_injected_once_and_then_acknowledged(failures: Failures) -> None:
-    command = asked(MOTOR, WRONG, 2.0, 0.5)
+    command = asked(MOTOR, WRONG, 6.0, 0.5)
     assert failures.inject(command, enabled=True) == PENDING
-    assert failures.take() == (Fault(MOTOR, WRONG, 2, (0.5, 0.0, 0.0, 0.0)),)
+    assert failures.take() == (Fault(MOTOR, WRONG, 6, (0.5, 0.0, 0.0, 0.0)),)
     assert failures.take() == ()
     assert failures.poll((), 8000) is None
     assert failures.poll((FaultResult(GPS, OFF, RESULT_ACCEPTED),), 8000) is None

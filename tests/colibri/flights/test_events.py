@@ -63,7 +63,7 @@ def test_texts_tables_and_structs_are_the_same_events(text: str, struct: Any, sp
         ("5:payload=-1", "payload: Expected float >= 0.0 - at $.kg"),
         ("5:payload=101", "payload: Expected float <= 100.0 - at $.kg"),
         ("-1:payload=1", "payload: Expected float >= 0.0 - at $.t"),
-        ("5:motor=7", "motor: Expected int <= 4 - at $.rotor"),
+        ("5:motor=7", "event motor at t = 5 s: instance must be 0 to 4"),
         ("5:motor=1.5", 'not "5:motor=1.5"'),
         ("5:paylod=1", 'unknown event "paylod" (did you mean "payload"?)'),
         ("5:failure=gsp,off", 'unknown FAILURE_UNIT "gsp" (did you mean "gps"?)'),
@@ -98,12 +98,13 @@ FLOWN: dict[str, tuple[Any, str, float, float]] = {
     "function": ({"t": 0.1, "event": "wind", "wind": lambda t: (20.0 * t, 0.0, 0.0)}, "x", 1e-5, 1.0),
     "motor": ("0.1:motor=1,0.6", "theta", 1e-3, 1.0),
     "failure": ("0.1:failure=motor,wrong,1,0.6", "theta", 1e-3, 1.0),
+    "motor of eight": ("0.1:motor=8,0.6", "theta", 1e-3, 1.0),
 }
 
 
 @pytest.mark.parametrize(("event", "column", "low", "high"), FLOWN.values(), ids=list(FLOWN))
 def test_an_event_acts_from_its_time_on(event: Any, column: str, low: float, high: float) -> None:
-    options: dict[str, Any] = {"duration": 0.4, "vehicle": "hummingbird"}
+    options: dict[str, Any] = {"duration": 0.4, "vehicle": "s1000" if "=8" in event else "hummingbird"}
     calm = colibri.fly("hover", **options)
     flights = [colibri.fly("hover", events=[event], link=link, **options) for link in ("memory", "memory", "direct")]
     (flight, again, direct) = flights
