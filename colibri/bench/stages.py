@@ -16,7 +16,6 @@ import numpy as np
 from colibri.autopilot.control.lpv_mpc import planning
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder
-from colibri.autopilot.control.parts.vehicle_tracking import VehicleTracker
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
@@ -48,7 +47,7 @@ class Stage(NamedTuple):
 
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
-    Stage("estimate", VehicleTracker, "observe"),
+    Stage("estimate", planning, "begin"),
     Stage("references", TargetBuilder, "on_clock"),
     Stage("condense", planning, "condense"),
     Stage("QP", Mpc, "solve"),

@@ -65,6 +65,7 @@ class PlanReferences(NamedTuple):
     squared: Array  # rotor speeds at samples 0 to N, (N + 1, m)
     thrusts_n: Array  # U1, (n,)
     end_squared: Array  # rotor speeds at the end, (m,)
+    force: Array  # to align thrust with now, N, ENU, (3,)
 
 
 @inlined

@@ -16,7 +16,7 @@ from colibri.autopilot.control.lpv_mpc.model import Disturbance
 from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limit_force, overcome_drag
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled, inlined
-from colibri.common.kernels import atan2, cos, sin
+from colibri.common.kernels import asin, atan2, cos, sin
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
@@ -64,9 +64,8 @@ def follow(
     law: Packed,
     vehicle: Packed,
     out: Packed,
-    force: Array,  # N, ENU, (3,)
-) -> None:
-    """Fill the `Target` of references by the clock, and the force to align thrust with now."""
+) -> tuple[float, float, float, float, float]:
+    """Fill the target of references by the clock; return its `aim`."""
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     n = target.yaw_rad.shape[0]
     p, v, a, yaw = before_jump((position[:n], velocity[:n], acceleration[:n], yaw_rad[:n]), law[0].interval_s)
@@ -84,7 +83,18 @@ def follow(
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(rigid, near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)
-    put(demanded_force(rigid, near, disturbance, law, limits, vehicle), force)
+    put(demanded_force(rigid, near, disturbance, law, limits, vehicle), target.force)
+    return aim(now, out)
+
+
+@compiled
+def aim(now: Packed, target: Packed) -> tuple[float, float, float, float, float]:
+    """Return the force's component along body z and its length, N, and the first attitude: phi, theta, psi."""
+    rigid, force, attitude = now[0].rigid, target[0].force, target[0].attitudes[0]
+    R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
+    along_n = force[0] * R[0][2] + force[1] * R[1][2] + force[2] * R[2][2]
+    phi, theta = atan2(attitude[2, 1], attitude[2, 2]), -asin(min(max(attitude[2, 0], -1.0), 1.0))
+    return along_n, norm(force), phi, theta, target[0].yaw_rad[0]
 
 
 @compiled

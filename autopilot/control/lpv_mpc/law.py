@@ -1,7 +1,7 @@
 """The LPV-MPC as a control law: references, observers and fallbacks."""
 
 from collections.abc import Mapping
-from math import ceil, nan, radians
+from math import ceil, inf, nan, radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -37,7 +37,7 @@ from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, 
 from colibri.autopilot.control.scaling import scaled
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
-from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, ObserverSettings
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, MEASURED, ObserverSettings
 from colibri.autopilot.control.vehicle_model.drag import with_learned
 from colibri.autopilot.control.vehicle_model.mass import MassSettings
 from colibri.autopilot.control.vehicle_model.mixer import mixing_of
@@ -51,12 +51,12 @@ from colibri.plant.vehicle.description import AXES, Vehicle
 
 _RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
 _AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
-_SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
+_SHARES, _ALWAYS = 3.0, 0.5
 """In the first steps each rotor is limited to `_SHARES` times its share of the required thrust, but at least `_ALWAYS`
 times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
 
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
-_UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
+_UPSIDE_DOWN, _NOTHING = (0.0, 1.0, 0.0, 0.0), np.empty(0)
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -104,13 +104,6 @@ class LawMemory(NamedTuple):
     deviation: Deviation | None = None
 
 
-class LawInputs(NamedTuple):
-    observed: Observed
-    psi: float  # yaw, rad, unwrapped
-    max_n: float  # largest thrust
-    airborne: bool
-
-
 class LpvMpc(AttitudeController[LawMemory]):
     """The control law; its predicted outputs are `planning.PREDICTED`, then the squared speeds of the rotors."""
 
@@ -152,11 +145,11 @@ class LpvMpc(AttitudeController[LawMemory]):
             self._mpc.turns,
         )
         self._targets = TargetBuilder(guidance, settings.path, self._mpc, upright=upright)
-        self._min_squared = square(self.tracker.lag.min_speed)
-        min_n = self._span_n * self._min_squared
+        min_squared = square(self.tracker.lag.min_speed)
+        min_n = self._span_n * min_squared
         min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
         self._force = ForceLimits(upright, tan(radians(max_tilt_deg)), min_n, min_n, min_up_n)
-        limits = np.empty((self._mpc.horizon, 2))
+        limits = np.full((self._mpc.horizon, 2), min_squared)
         self._now = packed(Now(np.empty(RIGID), np.empty(vehicle.rotors.count), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
@@ -201,66 +194,73 @@ class LpvMpc(AttitudeController[LawMemory]):
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        inputs = self._inputs(memory, state)
-        return self._decide(memory, inputs, self._targets.on_clock(self._now, references, memory.deviation))
+        observed = self._observe(memory, state)
+        return self._decide(memory, observed, self._targets.on_clock(self._now, references, memory.deviation))
 
     def step_on_path(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        inputs = self._inputs(memory, state)
+        observed = self._observe(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
-        wanted = self._targets.on_path(self._filled(inputs), references, last, memory.lag_us * 1e-6)
-        return self._decide(memory, inputs, wanted)
+        now = self._filled(observed)
+        wanted = self._targets.on_path(self._now, now, references, last, memory.lag_us * 1e-6)
+        return self._decide(memory, observed, wanted)
 
     def step_attitude(
         self, memory: LawMemory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        inputs = self._inputs(memory, state)
-        wanted = self._targets.of_demand(self._filled(inputs), demand)
-        return self._decide(memory, inputs, wanted, on_track=False)
+        observed = self._observe(memory, state)
+        wanted = self._targets.of_demand(self._now, self._filled(observed), demand)
+        return self._decide(memory, observed, wanted, on_track=False)
 
-    def _inputs(self, memory: LawMemory, state: VehicleState) -> LawInputs:
-        tracked, battery = memory.tracked, self.tracker.battery
+    def _observe(self, memory: LawMemory, state: VehicleState) -> Observed:
+        """Observe the vehicle, and fill the start of a plan."""
+        (speeds, wrench, mean_wrench, before, estimate_before, charge_ah, mass_kg), plan, age, _, _ = memory
+        tracker, battery = self.tracker, self.tracker.battery
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
-        observed = self.tracker.observe(tracked, state)
-        if observed.estimate.size == ESTIMATES:
-            self._model_kg[0] = observed.mass_kg
-        else:
-            self._model[0] = with_learned(self._airframe, observed.mass_kg, observed.estimate[ESTIMATES:])
-        expected = (
-            memory.plan.states[memory.age :, PREDICTED:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
-        )
-        max_n = self._span_n * square(battery.max_common_speed(tracked.charge_ah))
-        planning.begin(
-            observed.rigid,
-            tracked.speeds,
-            observed.estimate,
-            expected,
-            self._min_squared,
-            battery.open_voltage_v(tracked.charge_ah),
+        position, velocity, attitude, (_, _, psi), rate, _, _, airborne = state
+        max_n = self._span_n * square(battery.max_common_speed(charge_ah))
+        measured, estimate = np.empty(MEASURED), np.empty_like(estimate_before)
+        mass_kg, max_speed, current_a = planning.begin(
+            np.array((*position, *velocity, *attitude, *rate)),
+            speeds,
+            wrench,
+            mean_wrench,
+            _NOTHING if before is None else before,
+            estimate_before,
+            mass_kg,
+            airborne,
+            plan.states[age:, PREDICTED:] if plan else (speeds * speeds)[None, :],
+            battery.open_voltage_v(charge_ah),
             max_n,
+            tracker.model,
             battery.numbers,
             self._now,
+            measured,
+            estimate,
         )
-        return LawInputs(observed, float(state.euler[2]), max_n, state.airborne)
+        if estimate.size == ESTIMATES:
+            self._model_kg[0] = mass_kg
+        else:
+            self._model[0] = with_learned(self._airframe, mass_kg, estimate[ESTIMATES:])
+        return Observed(measured, estimate, mass_kg, max_speed, current_a, max_n, float(psi), airborne)
 
-    def _filled(self, inputs: LawInputs) -> Now:
-        return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
+    def _filled(self, observed: Observed) -> Now:
+        return self._arrays._replace(force=self._force._replace(max_n=observed.max_n))
 
     def _decide(
-        self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool = True
+        self, memory: LawMemory, observed: Observed, wanted: Wanted, *, on_track: bool = True
     ) -> tuple[LawMemory, Decision]:
-        squared, plan, age, how = self._choose(memory, inputs, wanted, on_track=on_track)
-        tracked, observed = memory.tracked, inputs.observed
-        commands, after = self.tracker.actuate(tracked, observed, squared)
+        squared, plan, age, how = self._choose(memory, observed, wanted, on_track=on_track)
+        commands, after = self.tracker.actuate(memory.tracked, observed, squared)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
-        phi, theta, psi = planning.first_angles(wanted.target)
+        _, _, phi, theta, psi = wanted.aim
         memory = LawMemory(after, plan, age, lag_us, wanted.deviation)
-        return memory, Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
+        return memory, Decision(commands, (phi, theta, nearest_turn(psi, observed.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         if plan is None or plan.speeds is None:
@@ -269,40 +269,39 @@ class LpvMpc(AttitudeController[LawMemory]):
         return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
 
     def _choose(
-        self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool
+        self, memory: LawMemory, observed: Observed, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        target, force, path, _ = wanted
-        mass_kg, path_lag_s = inputs.observed.mass_kg, memory.lag_us * 1e-6 if path else nan
-        along_n, force_n = planning.along(force, inputs.observed.measured)
-        if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
-            return self._recover(inputs, force, Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s))
-        if self._force.upright or not inputs.airborne:
+        target, (along_n, force_n, _, _, _), path, _ = wanted
+        mass_kg, path_lag_s = observed.mass_kg, memory.lag_us * 1e-6 if path else nan
+        if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, observed):
+            return self._recover(observed, Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s))
+        most = inf
+        if self._force.upright or not observed.airborne:
             most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
-            planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None
         plan, diagnostics = self._mpc.plan(
-            self._now, target, last, inputs.psi, path, on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s
-        )
+            self._now, target, last, observed.psi, most, path,
+            on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s,
+        )  # fmt: skip
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
         if memory.plan is not None and memory.age <= min(self._shifted_samples, self._mpc.horizon - 1):
             how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
             return memory.plan.commands[memory.age], memory.plan, memory.age + 1, how
-        return self._recover(inputs, force, diagnostics)
+        return self._recover(observed, diagnostics)
 
-    def _recover(
-        self, inputs: LawInputs, force: Array, diagnostics: Diagnostics
-    ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Turn the thrust axis to `force` the shortest way."""
-        rotation, rates = inputs.observed.rotation, inputs.observed.rigid[10:]
+    def _recover(self, observed: Observed, diagnostics: Diagnostics) -> tuple[Array, Plan | None, int, Diagnostics]:
+        """Turn the thrust axis to the force the shortest way."""
+        force, rates = self._targets.force, self._arrays.rigid[10:]
+        rotation = np.array(rotation_matrix(tuple(self._arrays.rigid[6:10].tolist())))
         moments = turning_moment(matvec(rotation.T, force / norm(force)), rates, self.tracker.inertia, self._turn)
-        thrust_n = max(dot(force, rotation[:, 2].copy()), 0.0)
+        thrust_n = max(dot(force, observed.measured[6:]), 0.0)
         squared = mix_with_priority(thrust_n, moments, self._mixing, *self._arrays.limits[0].tolist())
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
 
 
-def _planned(memory: LawMemory, inputs: LawInputs) -> bool:
+def _planned(memory: LawMemory, observed: Observed) -> bool:
     if memory.plan is None:
         return False
     planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))
-    return dot(np.array([row[2] for row in planned]), inputs.observed.rotation[:, 2].copy()) > _AS_PLANNED
+    return dot(np.array([row[2] for row in planned]), observed.measured[6:]) > _AS_PLANNED

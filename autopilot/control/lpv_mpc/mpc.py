@@ -179,6 +179,7 @@ class Mpc:
         target: Packed,
         last: Array | None,  # the previous plan's commands from now on, (n, m)
         psi: float,  # unwrapped
+        most: float,  # largest squared speed of the first steps
         path: PathNow | None = None,  # if the speed is free
         *,
         on_track: bool = True,  # else track attitude and thrust
@@ -189,9 +190,9 @@ class Mpc:
         qps = self._on_path if path else self._on_clock if on_track else self._on_hold
         last = self._none if last is None else last
         if path is None:
-            planning.condense(now, target, last, self.model, qps.kind)
+            planning.condense(now, target, last, most, self.model, qps.kind)
         else:
-            planning.condense_on_path(now, target, last, path, self._effects, self.model, qps.kind)
+            planning.condense_on_path(now, target, last, most, path, self._effects, self.model, qps.kind)
         started_s = self._clock()
         status, z, iterations, slack, soft = self.solve(*qps)
         solve_time_s = self._clock() - started_s
@@ -212,7 +213,9 @@ class Mpc:
     def warm_up(self) -> None:
         """Load compiled code of the soft limits, after a first plan."""
         planning.limit(self._on_clock.kind)
-        planning.count_active(self._on_clock.kind, np.zeros(len(self._on_clock.free.f)))
+        z = np.zeros(len(self._on_clock.free.f))
+        planning.is_beyond(self._on_clock.kind, z)
+        planning.count_active(self._on_clock.kind, z)
 
     def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
         """Return the optimal changes of the corrections.
@@ -220,9 +223,11 @@ class Mpc:
         An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again.
         """
         minimum = np.empty(len(free.f))
-        is_free = planning.is_free(kind, minimum)
+        is_free, is_beyond = planning.minimise(kind, minimum)
+        if is_free and not is_beyond:
+            return Corrections(QpStatus.SOLVED, minimum, 0)
         status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
-        if z is None or not planning.is_beyond(kind, z):
+        if z is None or not (is_beyond or planning.is_beyond(kind, z)):
             return Corrections(status, z, iterations)
         planning.limit(kind)
         status, z, more = self._solver.solve(limited)

@@ -15,16 +15,17 @@ from colibri.autopilot.control.lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
+from colibri.autopilot.control.parts.vehicle_tracking import look
 from colibri.autopilot.control.qp import Qp
 from colibri.autopilot.control.vehicle_model.battery import fill_limits
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.jit import Packed, compiled, inlined
-from colibri.common.kernels import asin, atan2
-from colibri.common.matrices import dot, norm, put
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
 PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 _BINDING = 1e-9  # an active limit has this or less left
+_LIMITED_STEPS = 3  # of the limit at low thrust
 
 
 class Now(NamedTuple):
@@ -62,68 +63,67 @@ class QpKind(NamedTuple):
 def begin(
     rigid: Array,
     speeds: Array,  # of the rotors, parts of the largest, (m,)
-    estimate: Array,
+    wrench: Array,
+    mean_wrench: Array,
+    before: Array,  # previous `measured`, (9,), or (0,)
+    estimate_before: Array,
+    mass_kg: float,
+    airborne: bool,
     expected: Array,  # squared, (n, m); their power limits the available speeds
-    least: float,  # squared speed at idle
     open_v: float,  # of the battery without load
     max_n: float,
+    tracker: Packed,  # the `TrackerModel`
     battery: Packed,
     now: Packed,
-) -> None:
-    """Fill the start of a plan, except the constant limits of the force."""
+    measured: Array,
+    estimate: Array,
+) -> tuple[float, float, float]:
+    """Observe the vehicle, as `look`, and fill the start of a plan, except its constants."""
     start = now[0]
     put(rigid, start.rigid)
+    seen = look(
+        rigid, speeds, wrench, mean_wrench, before, estimate_before, mass_kg, airborne, open_v,
+        tracker[0], battery, measured, estimate,
+    )  # fmt: skip
     for i in range(speeds.shape[0]):
         start.squared[i] = speeds[i] * speeds[i]
     for i in range(3):
         start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
-    start.limits[:, 0] = least
     fill_limits(expected, open_v, battery, start.limits[:, 1])
     start.force.max_n = max_n
+    return seen
 
 
 @compiled
-def along(force: Array, measured: Array) -> tuple[float, float]:
-    """Return the component of a force, ENU, (3,), along body z, and its length."""
-    return dot(force, measured[6:]), norm(force)
+def condense(now: Packed, target: Packed, last: Array, most: float, vehicle: Packed, kind: Packed) -> None:
+    """Fill the QP within the rotor limits.
 
-
-@compiled
-def limit_first(now: Packed, most: float, steps: int) -> None:
-    for step in range(min(steps, now[0].limits.shape[0])):
-        now[0].limits[step, 1] = min(now[0].limits[step, 1], most)
-
-
-@compiled
-def first_angles(target: Packed) -> tuple[float, float, float]:
-    R = target[0].attitudes[0]
-    return atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), target[0].yaw_rad[0]
-
-
-@compiled
-def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
-    """Fill the QP within the rotor limits; `last`: the previous plan's commands from now on, (n, m)."""
+    `last`: the previous plan's commands from now on, (n, m); `most`: largest squared speed of the first steps.
+    """
     work = kind[0].work
-    _expect(now[0], target[0], last, vehicle, kind[0])
+    _expect(now[0], target[0], last, most, vehicle, kind[0])
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
 
 
 @compiled
 def condense_on_path(
-    now: Packed, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
-) -> None:
+    now: Packed, target: Packed, last: Array, most: float, path: PathNow, effects: SpeedEffects, vehicle: Packed,
+    kind: Packed,
+) -> None:  # fmt: skip
     """Fill the QP with free speed along the path."""
     work = kind[0].work
-    _expect(now[0], target[0], last, vehicle, kind[0])
+    _expect(now[0], target[0], last, most, vehicle, kind[0])
     fill_slides(path, effects, work.responses)
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
     price(path, effects, kind[0].problem.starts, kind[0].qp)
 
 
 @inlined
-def _expect(now: Now, target: PlanReferences, last: Array, vehicle: Packed, kind: QpKind) -> None:
+def _expect(now: Now, target: PlanReferences, last: Array, most: float, vehicle: Packed, kind: QpKind) -> None:
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
     commands, corrections = work.commands, work.corrections
+    for step in range(min(_LIMITED_STEPS, commands.shape[0])):
+        now.limits[step, 1] = min(now.limits[step, 1], most)
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)
     corrections[:] = 0.0
     ease(commands, starts, now.limits)
@@ -173,8 +173,12 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 
 @compiled
-def is_free(kind: Packed, z: Array) -> bool:
-    return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, len(kind[0].problem.allocation), z)
+def minimise(kind: Packed, z: Array) -> tuple[bool, bool]:
+    """Write the unconstrained minimum; return whether it is within the rotor limits, and beyond a soft limit."""
+    problem = kind[0].problem
+    if not free_minimum(kind[0].qp, problem.starts.shape[0] - 1, len(problem.allocation), z):
+        return False, False
+    return True, exceeds(kind[0].work.motion, kind[0].work.responses, z, problem)
 
 
 @compiled

@@ -23,7 +23,7 @@ class Wanted(NamedTuple):
     """The target of a plan."""
 
     target: Packed  # the `PlanReferences`
-    force: Array  # to align thrust with now, N, ENU, (3,)
+    aim: tuple[float, float, float, float, float]  # of `feed_forward.aim`
     path: PathNow | None = None  # nominal speeds along the path, if free
     deviation: Deviation | None = None  # from references beyond the largest thrust
 
@@ -36,26 +36,27 @@ class TargetBuilder:
         self._samples = n = mpc.horizon + 2
         rotors = len(mpc.from_wrench)
         track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, rotors))
-        attitudes, scalars = np.zeros((n, 3, 3)), np.zeros(n)
+        attitudes, scalars, end, force = np.zeros((n, 3, 3)), np.zeros(n), np.zeros(rotors), np.zeros(3)
         self._record = packed(
-            PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(rotors))
+            PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, end, force)
         )
         self._target = target = opened(self._record, PlanReferences)
+        self.force = target.force  # of the last target
         self._near = (target.position, target.velocity, target.acceleration)
         self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
 
     def on_clock(self, now: Packed, references: Horizon, deviation: Deviation | None) -> Wanted:
-        (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
+        p, v, a, _, _, yaw, _, _ = references
         if not self._upright:
             before = self._none if deviation is None else deviation
             arrays = (before.motion.copy(), before.coefficients.copy(), before.dual.copy())
             model, near = self._mpc.model, _motion(self._samples)
             phase = stay_within(now, p, v, a, self._compromise, model, before.phase, *arrays, near)
             (p, v, a), deviation = near, Deviation(phase, *arrays) if phase >= 0 else None
-        feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
-        return Wanted(self._record, force, None, deviation)
+        aim = feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record)
+        return Wanted(self._record, aim, None, deviation)
 
-    def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
+    def on_path(self, record: Packed, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return the target of references at the path times of the previous plan.
 
         Feed-forward is that of the present speed, held; at the end, that of the final speed.
@@ -88,8 +89,8 @@ class TargetBuilder:
         distance_m = norm(nominal[0][0] - now.rigid[:3])
         part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
         bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
-        force = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
-        return Wanted(self._record, force, PathNow(speeds, slopes, part, bounds))
+        target.force[:] = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
+        return Wanted(self._record, feed_forward.aim(record, self._record), PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
         """Return the vehicle's speed along the path, (1,); 1 at a standstill."""
@@ -98,7 +99,7 @@ class TargetBuilder:
         speed = dot(velocity, along) / squared if squared > _STILL_M_S * _STILL_M_S else 1.0
         return np.array([min(max(speed, self._path.min_speed), upper)])
 
-    def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
+    def of_demand(self, record: Packed, now: Now, demand: AttitudeDemand) -> Wanted:
         n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         if not self._guidance.turns:
@@ -108,7 +109,8 @@ class TargetBuilder:
         feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
         target.yaw_rad[:], target.end_squared[:] = angles[:, 2], flat.squared[-1]
         target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
-        return Wanted(self._record, flat.forces[0].copy())
+        target.force[:] = flat.forces[0]
+        return Wanted(self._record, feed_forward.aim(record, self._record))
 
     def _flat_of(self, n: int) -> Flat:
         rotors = len(self._mpc.from_wrench)

@@ -12,7 +12,7 @@ from colibri.autopilot.control.vehicle_model.airframe import Airframe, airframe_
 from colibri.autopilot.control.vehicle_model.drag import learn_drag
 from colibri.common.config import Positive, Table
 from colibri.common.elementary import square
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import compiled
 from colibri.common.kernels import exp
 from colibri.common.matrices import put
 from colibri.common.types import Array
@@ -73,9 +73,8 @@ def observe(
     wrench: Array,  # mean over the interval, (4,)
     momentum: float,  # h of the rotors along body z, N m s
     mass_kg: float,
-    packed: Packed,
+    observer: ObserverModel,
 ) -> Array:
-    observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
     thrust_n, moment_n_m = wrench[0], wrench[1:]
     middle = 0.5 * (before + now)
@@ -112,10 +111,10 @@ def observe(
 
 
 @compiled
-def limit_near_ground(estimate: Array, before: Array, packed: Packed) -> None:
+def limit_near_ground(estimate: Array, before: Array, observer: ObserverModel) -> None:
     """Limit the lift and the moments: those of the feet end with the take-off. Drag is learned in the air."""
     put(before[ESTIMATES:], estimate[ESTIMATES:])
-    estimate[8] = min(estimate[8], max(before[8], _NEAR_GROUND * packed[0].max_acceleration_m_s2))
+    estimate[8] = min(estimate[8], max(before[8], _NEAR_GROUND * observer.max_acceleration_m_s2))
     for i in range(9, ESTIMATES):
-        most = max(abs(before[i]), _NEAR_GROUND * packed[0].max_moment_n_m)
+        most = max(abs(before[i]), _NEAR_GROUND * observer.max_moment_n_m)
         estimate[i] = min(max(estimate[i], -most), most)

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 import msgspec
 
 from colibri.common.config import NotNegative, Table
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -52,9 +52,8 @@ def mass_model(settings: MassSettings, vehicle: Vehicle, interval_s: float) -> M
 
 
 @compiled
-def follow_mass(mass_kg: float, disturbance_m_s2: Array, up: Array, thrust_n: float, packed: Packed) -> float:
+def follow_mass(mass_kg: float, disturbance_m_s2: Array, up: Array, thrust_n: float, model: MassModel) -> float:
     """Return the next mass in flight; `disturbance_m_s2`, ENU, (3,), loses the part that it explains."""
-    model = packed[0]
     before, specific = model.nominal_kg / mass_kg, 1.0
     if model.rate_1_s > 0.0:
         along = disturbance_m_s2[0] * up[0] + disturbance_m_s2[1] * up[1] + disturbance_m_s2[2] * up[2]

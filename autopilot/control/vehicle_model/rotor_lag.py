@@ -28,6 +28,7 @@ class SampledLag(NamedTuple):
 class RotorModel(NamedTuple):
     lag: SampledLag
     allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, m)
+    top: float  # largest speed, the vehicle's unit
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> SampledLag:
@@ -60,7 +61,7 @@ def lead(speeds: Array, squared_commands: Array, lag: SampledLag, max_speed: flo
 
 
 @compiled
-def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
+def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Packed, out: Array) -> None:
     """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, (4, m or more)."""
     lag, allocation, rotors = packed[0].lag, packed[0].allocation, speeds.shape[0]
     commands, after, wrench, mean = out[0, :rotors], out[1, :rotors], out[2], out[3]
@@ -72,4 +73,4 @@ def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float
             wrench[row] += allocation[row, i] * after[i] * after[i]
             mean[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
     for i in range(speeds.shape[0]):
-        commands[i] *= top
+        commands[i] *= packed[0].top
