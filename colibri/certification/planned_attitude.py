@@ -98,7 +98,7 @@ class PlannedAttitude:
         least, most = (n / float(self._to_wrench[0].sum()) for n in thrusts_n)
         headroom = min(self.max_squared - most, least - max(self._min_squared, _SPARED * least))
         slowest, fastest = sqrt(max(least - headroom, 0.0)), sqrt(most + headroom)
-        momentum = self._law.tracker.momentum
+        momentum = self._law.tracker.model["momentum"][0]
         # Squared speeds that change by ds change speeds by ds / (before + after).
         slow, fast = 0.5 / slowest, 0.5 / fastest
         largest = [round(2.0 * sin(0.5 * scale * radians(settings.plan.max_tilt_deg)), _DIGITS)] * INPUTS

@@ -149,8 +149,9 @@ class LpvMpc(AttitudeController[LawMemory]):
         min_n = self._span_n * min_squared
         min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
         self._force = ForceLimits(upright, tan(radians(max_tilt_deg)), min_n, min_n, min_up_n)
+        rigid, squared = np.empty(RIGID), np.empty(vehicle.rotors.count)
         limits = np.full((self._mpc.horizon, 2), min_squared)
-        self._now = packed(Now(np.empty(RIGID), np.empty(vehicle.rotors.count), _NO_DISTURBANCE, limits, self._force))
+        self._now = packed(Now(rigid, squared, _NO_DISTURBANCE, limits, self._force, self._span_n))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
         self._model, self._airframe = self._mpc.model["airframe"], airframe_of(vehicle)
@@ -219,30 +220,16 @@ class LpvMpc(AttitudeController[LawMemory]):
     def _observe(self, memory: LawMemory, state: VehicleState) -> Observed:
         """Observe the vehicle, and fill the start of a plan."""
         (speeds, wrench, mean_wrench, before, estimate_before, charge_ah, mass_kg), plan, age, _, _ = memory
-        tracker, battery = self.tracker, self.tracker.battery
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
         position, velocity, attitude, (_, _, psi), rate, _, _, airborne = state
-        max_n = self._span_n * square(battery.max_common_speed(charge_ah))
-        measured, estimate = np.empty(MEASURED), np.empty_like(estimate_before)
-        mass_kg, max_speed, current_a = planning.begin(
-            np.array((*position, *velocity, *attitude, *rate)),
-            speeds,
-            wrench,
-            mean_wrench,
-            _NOTHING if before is None else before,
-            estimate_before,
-            mass_kg,
-            airborne,
+        measured, estimate = np.empty(MEASURED), np.empty(estimate_before.size)
+        mass_kg, max_speed, current_a, max_n = planning.begin(
+            position, velocity, attitude, rate, speeds, wrench, mean_wrench, _NOTHING if before is None else before,
+            estimate_before, mass_kg, charge_ah, airborne,
             plan.states[age:, PREDICTED:] if plan else (speeds * speeds)[None, :],
-            battery.open_voltage_v(charge_ah),
-            max_n,
-            tracker.model,
-            battery.numbers,
-            self._now,
-            measured,
-            estimate,
-        )
+            self.tracker.model, self.tracker.battery.numbers, self._now, measured, estimate,
+        )  # fmt: skip
         if estimate.size == ESTIMATES:
             self._model_kg[0] = mass_kg
         else:

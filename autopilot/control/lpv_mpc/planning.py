@@ -15,13 +15,14 @@ from colibri.autopilot.control.lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
-from colibri.autopilot.control.parts.vehicle_tracking import look
 from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.vehicle_model.battery import fill_limits
-from colibri.common.compiled_rotations import euler_from_quaternion
+from colibri.autopilot.control.vehicle_model.battery import common_speed, fill_limits, open_voltage_now, terminal
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, limit_near_ground, observe
+from colibri.autopilot.control.vehicle_model.mass import follow_mass
+from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
 from colibri.common.jit import Packed, compiled, inlined
-from colibri.common.matrices import put
-from colibri.common.types import Array
+from colibri.common.matrices import dot, put
+from colibri.common.types import Array, Quaternion, Vector
 
 PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 _BINDING = 1e-9  # an active limit has this or less left
@@ -36,6 +37,7 @@ class Now(NamedTuple):
     disturbance: Disturbance
     limits: Array  # least and largest squared speed of each step, (N, 2)
     force: ForceLimits  # demanded by references
+    span_n: float  # thrust of all rotors at their largest speed
 
 
 class Workspace(NamedTuple):
@@ -61,37 +63,42 @@ class QpKind(NamedTuple):
 
 @compiled
 def begin(
-    rigid: Array,
-    speeds: Array,  # of the rotors, parts of the largest, (m,)
-    wrench: Array,
-    mean_wrench: Array,
-    before: Array,  # previous `measured`, (9,), or (0,)
-    estimate_before: Array,
-    mass_kg: float,
-    airborne: bool,
-    expected: Array,  # squared, (n, m); their power limits the available speeds
-    open_v: float,  # of the battery without load
-    max_n: float,
-    tracker: Packed,  # the `TrackerModel`
-    battery: Packed,
-    now: Packed,
-    measured: Array,
-    estimate: Array,
-) -> tuple[float, float, float]:
-    """Observe the vehicle, as `look`, and fill the start of a plan, except its constants."""
-    start = now[0]
-    put(rigid, start.rigid)
-    seen = look(
-        rigid, speeds, wrench, mean_wrench, before, estimate_before, mass_kg, airborne, open_v,
-        tracker[0], battery, measured, estimate,
-    )  # fmt: skip
-    for i in range(speeds.shape[0]):
-        start.squared[i] = speeds[i] * speeds[i]
+    position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector, speeds: Array, wrench: Array,
+    mean_wrench: Array, before: Array, estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool,
+    expected: Array, tracker: Packed, battery: Packed, now: Packed, measured: Array, estimate: Array,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Observe the vehicle, and fill the start of a plan; return mass, largest speed, current and largest thrust.
+
+    Arguments are those of `VehicleState` and `Tracked`, `before` is (0,) at first. The power of `expected` squared
+    speeds, (n, m), limits the speeds. Filled are `measured` and `estimate` of `Observed`, and `now` except constants.
+    """
+    start, model = now[0], tracker[0]
+    rigid, R = start.rigid, rotation_matrix(attitude)
+    for i in range(3):
+        rigid[i], rigid[3 + i], rigid[10 + i] = position[i], velocity[i], rate[i]
+        measured[i], measured[3 + i], measured[6 + i] = velocity[i], rate[i], R[i][2]
+    for i in range(4):
+        rigid[6 + i] = attitude[i]
+    if before.shape[0] > 0:
+        h = dot(model.momentum, speeds)
+        put(observe(estimate_before, before, measured, mean_wrench, h, mass_kg, model.observer), estimate)
+    else:
+        put(estimate_before, estimate)
+        put(measured, estimate[:6])
+        estimate[6:ESTIMATES] = 0.0
+    if airborne:
+        mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], model.mass)
+    else:
+        limit_near_ground(estimate, estimate_before, model.observer)
     for i in range(3):
         start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
+    for i in range(speeds.shape[0]):
+        start.squared[i] = speeds[i] * speeds[i]
+    open_v, speed = open_voltage_now(battery[0], charge_ah), common_speed(charge_ah, battery)
     fill_limits(expected, open_v, battery, start.limits[:, 1])
-    start.force.max_n = max_n
-    return seen
+    start.force.max_n = start.span_n * (speed * speed)
+    voltage_v, current_a = terminal(open_v, speeds, battery)
+    return mass_kg, voltage_v / battery[0].full_voltage_v, current_a, start.force.max_n
 
 
 @compiled

@@ -5,22 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model import rotor_lag
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, terminal
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged
 from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     ESTIMATES,
     ObserverModel,
     ObserverSettings,
-    limit_near_ground,
-    observe,
     observer_of,
 )
 from colibri.autopilot.control.vehicle_model.drag import LEARNED
-from colibri.autopilot.control.vehicle_model.mass import MassModel, MassSettings, follow_mass, mass_model
+from colibri.autopilot.control.vehicle_model.mass import MassModel, MassSettings, mass_model
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorModel
-from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
-from colibri.common.jit import Packed, compiled, packed
-from colibri.common.matrices import dot, matvec, put
+from colibri.common.jit import packed
+from colibri.common.matrices import matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -88,38 +85,3 @@ class VehicleTracker:
         charge_ah = charged(tracked.charge_ah, observed.current_a, self._interval_s)
         seen = observed.measured, observed.estimate
         return commands, Tracked(speeds, wrench, mean_wrench, *seen, charge_ah, observed.mass_kg)
-
-
-@compiled
-def look(
-    rigid: Array,
-    speeds: Array,
-    wrench: Array,
-    mean_wrench: Array,
-    before: Array,  # previous `measured`, (9,), or (0,)
-    estimate_before: Array,
-    mass_kg: float,
-    airborne: bool,
-    open_v: float,  # without load
-    model: TrackerModel,
-    battery: Packed,
-    measured: Array,
-    estimate: Array,
-) -> tuple[float, float, float]:
-    """Fill the arrays of `Observed`; return its mass, largest speed and current."""
-    R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
-    for i in range(3):
-        measured[i], measured[3 + i], measured[6 + i] = rigid[3 + i], rigid[10 + i], R[i][2]
-    if before.shape[0] > 0:
-        h = dot(model.momentum, speeds)
-        put(observe(estimate_before, before, measured, mean_wrench, h, mass_kg, model.observer), estimate)
-    else:
-        put(estimate_before, estimate)
-        put(measured, estimate[:6])
-        estimate[6:ESTIMATES] = 0.0
-    if airborne:
-        mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], model.mass)
-    else:
-        limit_near_ground(estimate, estimate_before, model.observer)
-    voltage_v, current_a = terminal(open_v, speeds, battery)
-    return mass_kg, voltage_v / battery[0].full_voltage_v, current_a

@@ -156,16 +156,9 @@ class RotorWatch:
         _, velocity, attitude, _, rate, *_ = state
         battery = self._battery
         found: tuple[int, float] = _take_in(
-            velocity,
-            attitude,
-            rate,
-            controls,
-            battery.open_voltage_v(charge_ah),
-            counts,
-            self._numbers,
-            battery.numbers,
-            self._memory,
-        )
+            velocity, attitude, rate, controls, battery.open_voltage_v(charge_ah), counts,
+            self._numbers, battery.numbers, self._memory,
+        )  # fmt: skip
         return found
 
 

@@ -6,6 +6,8 @@ V = V0 - R I, V0 linear in the charge taken, top speed proportional to V.
 from math import sqrt
 from typing import NamedTuple
 
+import numpy as np
+
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, packed
 from colibri.common.types import Array
@@ -29,22 +31,23 @@ class BatteryNumbers(NamedTuple):
     full_power_w: float = 0.0  # of a rotor at its largest speed
     full_voltage_v: float = 1.0
     resistance_ohm: float = 0.0
+    empty_voltage_v: float = 1.0
+    capacity_ah: float = 1.0
+    common: Array = np.ones(_INTERVALS + 1)  # speed available to all rotors at once, at equal steps of the charge
 
 
 class BatteryModel:
     """The battery of one vehicle; without one, power is unlimited."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self._battery, self._rotors = vehicle.battery, float(vehicle.rotors.count)
+        self._battery = battery = vehicle.battery
         drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
-        efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
-        self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
-        self._max_speeds: dict[int, float] = {}
-        numbers = BatteryNumbers()
-        if self._battery:
-            self._step_ah = self._battery.capacity_ah / _INTERVALS
-            numbers = BatteryNumbers(self._full_power_w, self._battery.full_voltage_v, self._battery.resistance_ohm)
-        self.numbers = packed(numbers)
+        self.numbers = packed(BatteryNumbers())
+        if battery:
+            power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / battery.efficiency
+            known = (battery.full_voltage_v, battery.resistance_ohm, battery.empty_voltage_v, battery.capacity_ah)
+            self.numbers = packed(BatteryNumbers(power_w, *known))
+            _fill_common(float(vehicle.rotors.count), self.numbers)
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
         _, current_a = self.terminal(charge_ah, speeds)
@@ -65,37 +68,45 @@ class BatteryModel:
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
 
     def max_common_speed(self, charge_ah: float) -> float:
-        """Return the speed available to all rotors at once."""
-        if self._battery is None:
-            return 1.0
-        whole, part = divmod(charge_ah / self._step_ah, 1.0)
-        if whole >= _INTERVALS:
-            return self._balanced(self._battery, _INTERVALS)
-        before, after = self._balanced(self._battery, int(whole)), self._balanced(self._battery, int(whole) + 1)
-        return before + part * (after - before)
-
-    def _balanced(self, battery: Battery, point: int) -> float:
-        if point in self._max_speeds:
-            return self._max_speeds[point]
-        open_v = open_voltage_v(battery, self._step_ah * point)
-        low, high = 0.0, 1.0
-        for _ in range(_BISECTIONS):
-            speed = 0.5 * (low + high)
-            power_w = self._rotors * self._full_power_w * speed * speed * speed
-            voltage_v = loaded_voltage_v(open_v, power_w, battery.resistance_ohm)
-            enough = voltage_v >= speed * battery.full_voltage_v
-            low, high = (speed, high) if enough else (low, speed)
-        self._max_speeds[point] = low
-        return low
+        """Return the speed available to all rotors at once, in parts of the largest."""
+        speed: float = common_speed(charge_ah, self.numbers)
+        return speed
 
 
 def charged(charge_ah: float, current_a: float, duration_s: float) -> float:
     return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
 
-def open_voltage_v(battery: Battery, charge_ah: float) -> float:
+def open_voltage_v(battery: Battery | BatteryNumbers, charge_ah: float) -> float:
     used = min(charge_ah / battery.capacity_ah, 1.0)
     return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
+
+
+open_voltage_now = compiled(open_voltage_v)
+
+
+@compiled
+def common_speed(charge_ah: float, packed: Packed) -> float:
+    battery = packed[0]
+    steps = max(charge_ah / (battery.capacity_ah / _INTERVALS), 0.0)
+    if steps >= _INTERVALS:
+        return float(battery.common[_INTERVALS])
+    before, after = battery.common[int(steps)], battery.common[int(steps) + 1]
+    return float(before + (steps - int(steps)) * (after - before))
+
+
+@compiled
+def _fill_common(rotors: float, packed: Packed) -> None:
+    battery = packed[0]
+    for step in range(_INTERVALS + 1):
+        open_v = open_voltage_now(battery, battery.capacity_ah / _INTERVALS * step)
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            speed = 0.5 * (low + high)
+            power_w = rotors * battery.full_power_w * speed * speed * speed
+            enough = loaded_voltage_v(open_v, power_w, battery.resistance_ohm) >= speed * battery.full_voltage_v
+            low, high = (speed, high) if enough else (low, speed)
+        battery.common[step] = low
 
 
 @compiled
