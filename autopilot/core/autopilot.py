@@ -88,6 +88,7 @@ class Autopilot(Generic[StagesT]):
     def __init__(self, stages: StagesT, clock: Clock) -> None:
         self.stages = stages
         self.frame_interval_us = stages.loop.frame_interval_us  # the control interval or a fraction of it
+        self._longest_us = max(self.frame_interval_us, _MISSED_US)
         self._clock = clock
 
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
@@ -97,7 +98,7 @@ class Autopilot(Generic[StagesT]):
         stages.receive(frame, plant_status)
         due = stages.loop.is_due(now_us)
         before_us = stages.time_us
-        begins = before_us is None or not 0 < now_us - before_us <= max(self.frame_interval_us, _MISSED_US)
+        begins = before_us is None or not 0 < now_us - before_us <= self._longest_us
         known = stages.estimate(frame, now=due or begins)
         if known is None:
             stages.wait(now_us)

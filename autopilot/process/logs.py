@@ -78,14 +78,15 @@ class AutopilotLog:
             return
         if step.estimate is not None:
             self.topics.add(ESTIMATE, _estimate_row(step.estimate))
-        how = step.decision.diagnostics
-        codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
-        times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
-        counts = (how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s, how.qp_iterations)
-        decided = (*step.decision.attitude_reference, *codes, *times_us, *counts)
+        _, reference, how = step.decision
+        status, fallback, solve_time_s, cost, active, slack, _, _, mass_kg, path_lag_s, iterations = how
+        decided = (
+            *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6, step.duration_s * 1e6,
+            cost, slack, *active, step.delay_us, mass_kg, path_lag_s, iterations,
+        )  # fmt: skip
         self.topics.add(DECISION, (time_us / 1e6, *decided))
         if self._views is not None:
-            self._note(time_us, how.fallback)
+            self._note(time_us, fallback)
             if self._thinning.is_due(time_us):
                 self._view(*self._views, step, decided)
 

@@ -9,12 +9,13 @@ from colibri.common.types import Address
 from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US
+from colibri.mavlink.hil.lockstep import BATTERY_EVERY_US, HEARTBEAT_EVERY_US
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING
+from colibri.mavlink.hil.rounding import state_as_received
 from colibri.mavlink.hil.sensors import SensorFrame, sensors_as_received
-from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame, command_as_received, state_as_received
+from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame, command_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import World
@@ -130,13 +131,13 @@ class InMemory:
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         now_us = plant.world.time_us
-        frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
+        frame, plant_status = plant.measure(with_battery=now_us % BATTERY_EVERY_US == 0)
         received, datagram = None, b""
         if plant_status is NOTHING and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
             received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)
         if received is not None:
             step = autopilot.step(received)
-            self.autopilot_end.follow(now_us)
+            self.autopilot_end.follow(now_us, encoded=bool(step.faults))
             if not step.faults:
                 command = command_as_received(step.command)
                 assert command is not None, "a control law's command is one that rotors can follow"
@@ -144,7 +145,6 @@ class InMemory:
                     datagram = self.plant_end.encoded(frame)
                 else:
                     self.plant_end.skip()
-                self.autopilot_end.skip()
                 return Answered(step, command, (), datagram)
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()

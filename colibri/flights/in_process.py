@@ -36,7 +36,7 @@ def fly_locally(
         record = traffic.write if traffic else None
         replayed, rotors = log.topics.for_viewers, plan.plant_vehicle.rotors.count
         wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=record, replayed=replayed, rotors=rotors)
-    frames = 0
+    frames, pace = 0, plan.spec.pace
     try:
         truth.write_world(plant.world)
         with gc_frozen():
@@ -46,8 +46,8 @@ def fly_locally(
                 truth.write_world(sample.world)
                 frames += 1
                 progress(sample.world.time_us / 1e6)
-                if isfinite(plan.spec.pace):
-                    sleep(max(0.0, began_s + sample.world.time_us / 1e6 / plan.spec.pace - perf_counter()))
+                if isfinite(pace):
+                    sleep(max(0.0, began_s + sample.world.time_us / 1e6 / pace - perf_counter()))
             log.flush()
             wall_time_s = perf_counter() - began_s
     finally:

@@ -72,13 +72,11 @@ class AutopilotEnd(AnsweringEnd):
         following = self._next(frame, now_s)
         return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
-    def follow(self, time_us: int) -> None:
-        """Go on from a frame that was answered without a datagram."""
+    def follow(self, time_us: int, *, encoded: bool) -> None:
+        """Go on from a frame that came without a datagram; count an answer that is not `encoded`, too."""
         self._time_us = time_us
-
-    def skip(self) -> None:
-        """Count an answer that was not encoded, for the numbers of later ones."""
-        self._codec.skip(1)
+        if not encoded:
+            self._codec.skip(1)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         answer = encode_actuators(self._codec, command)

@@ -1,10 +1,9 @@
 """State frames and commands between plant and autopilot, in SI, ENU/FLU, and as MAVLink; invalid input is `None`."""
 
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from math import isfinite, sqrt
-from struct import Struct
 from typing import Any, NamedTuple
 
 from colibri.common.types import PerRotor, Quaternion, Vector
@@ -15,8 +14,7 @@ from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 ROTORS = 4  # of a plant that is not told otherwise
 LOCKSTEP_FLAG = 1  # HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message
 
-_UNIT_NORM_TOLERANCE = 1e-3
-_SINGLES = Struct("<13f")
+UNIT_NORM_TOLERANCE = 1e-3
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
 STATE_MESSAGES = 2
@@ -56,13 +54,6 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
     return [turning, _POSITION.encode(codec, (time_ms, y, x, -z, vy, vx, -vz))]
 
 
-def state_as_received(frame: StateFrame) -> StateFrame | None:
-    """Return the frame as rounded by `encode_state` and `read_state`."""
-    time_us, position, velocity, attitude, rate = frame
-    numbers = _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
-    return _frame(time_us - time_us % 1000, _SINGLES.unpack(numbers))
-
-
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
     """Read a datagram of exactly the two full-length frames of `source`; otherwise `None`."""
     if len(datagram) != STATE_BYTES:
@@ -89,7 +80,7 @@ def _frame(time_us: int, numbers: Sequence[float]) -> StateFrame | None:
     q1, q2, q3, q4, x, y, z, vx, vy, vz, p, q, r = numbers
     squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
     # Numbers are single floats: their sum is finite if each of them is.
-    if not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE or not isfinite(x + y + z + vx + vy + vz + p + q + r):
+    if not abs(squared - 1.0) < UNIT_NORM_TOLERANCE or not isfinite(x + y + z + vx + vy + vz + p + q + r):
         return None
     norm = sqrt(squared)
     unit = ned_frd_from_enu_flu((q1 / norm, q2 / norm, q3 / norm, q4 / norm))
@@ -106,7 +97,7 @@ def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     """Return the command as rounded by `encode_actuators` and `read_actuators`."""
     time_us, controls, armed = command
-    return _within_range(time_us, array("f", controls), armed)
+    return _within_range(time_us, tuple(array("f", controls)), armed)
 
 
 def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:
@@ -124,11 +115,11 @@ def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand 
 
 def _command(numbers: Sequence[Any]) -> ActuatorCommand | None:
     time_us, _, *controls, mode = numbers
-    return _within_range(time_us, controls, bool(mode & MODE_ARMED))
+    return _within_range(time_us, tuple(controls), bool(mode & MODE_ARMED))
 
 
-def _within_range(time_us: int, controls: Iterable[float], armed: bool) -> ActuatorCommand | None:
-    for control in (within := tuple(controls)):
+def _within_range(time_us: int, controls: PerRotor, armed: bool) -> ActuatorCommand | None:
+    for control in controls:
         if not 0.0 <= control <= 1.0:
             return None
-    return ActuatorCommand(time_us, within, armed)
+    return ActuatorCommand(time_us, controls, armed)

@@ -166,6 +166,8 @@ FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND, MORE_TRUTH, MORE_CO
 
 def split(rotors: PerRotor) -> tuple[PerRotor, PerRotor]:
     """Return four rotors, and the others or (), each filled up with nan."""
+    if len(rotors) == ROTORS:
+        return rotors, ()
     first, others = rotors[:ROTORS], rotors[ROTORS:]
     return _filled(first), _filled(others) if others else others
 

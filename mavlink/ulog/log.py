@@ -1,5 +1,6 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
@@ -47,7 +48,7 @@ class TopicLog:
 
     def __init__(self, append: Callable[[bytes], object]) -> None:
         self.append = append
-        self._waiting: dict[RowEncoder, list[bytes]] = {}
+        self._waiting: defaultdict[RowEncoder, list[bytes]] = defaultdict(list)
         self._queued: list[bytes] = []
         self._beginning = b""
 
@@ -55,9 +56,7 @@ class TopicLog:
         self._beginning = beginning
 
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
-        waiting = self._waiting.get(encoder)
-        if waiting is None:
-            waiting = self._waiting[encoder] = []
+        waiting = self._waiting[encoder]
         waiting.append(encoder.pack.pack(*row))
         if len(waiting) >= encoder.block_rows:
             self._take(encoder)

@@ -1,7 +1,6 @@
 """Integrators of one frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4)."""
 
 from collections.abc import Callable
-from functools import lru_cache
 from math import ceil, sqrt
 from typing import Literal, TypeAlias
 
@@ -10,9 +9,9 @@ import numpy as np
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
 from colibri.common.types import Array, PerRotor
-from colibri.plant.physics.equations import close, hold, write_derivative
+from colibri.plant.physics.equations import close, close_attitude, hold, write_derivative
 
-Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float], tuple[Array, float]]  # as `fixed_step`
+Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float, Array], tuple[float, bool]]  # as `fixed_step`
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
 RK4_STEP_S = 0.001
@@ -38,24 +37,21 @@ _SAFETY, _MIN_FACTOR, _MAX_FACTOR, _EXPONENT = 0.9, 0.2, 10.0, -0.2
 _TOO_SMALL = 1e-14  # smallest step, in parts of the frame
 
 
-def fixed_step(x: Array, target: PerRotor, parameters: Packed, duration_s: float) -> tuple[Array, float]:
-    """Return x after `duration_s` of commanded rotor speeds, and the battery's voltage."""
-    end = np.empty_like(x)
-    return end, runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s), end)
+@compiled
+def fixed_step(start: Array, target: PerRotor, parameters: Packed, duration_s: float, x: Array) -> tuple[float, bool]:
+    """Write x after `duration_s` of commanded rotor speeds; return the battery's voltage, and whether x is finite."""
+    steps = max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
+    voltage_v = runge_kutta_4(start, target, parameters, duration_s, steps, x)
+    return voltage_v, close_attitude(x)
 
 
-@lru_cache(maxsize=64)
-def _steps(duration_s: float) -> int:
-    return max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
-
-
-def adaptive_step(x: Array, target: PerRotor, parameters: Packed, duration_s: float) -> tuple[Array, float]:
-    """Integrate by Dormand-Prince; nan if the step size underflows."""
-    end = np.empty_like(x)
-    voltage_v, done = dormand_prince(x, target, parameters, duration_s, end)
-    if not done:
-        end[:] = np.nan
-    return end, voltage_v
+@compiled
+def adaptive_step(
+    start: Array, target: PerRotor, parameters: Packed, duration_s: float, x: Array
+) -> tuple[float, bool]:
+    """Integrate as `fixed_step` by Dormand-Prince; False also if the step size underflows."""
+    voltage_v, done = dormand_prince(start, target, parameters, duration_s, x)
+    return voltage_v, close_attitude(x) and done
 
 
 def solver(name: Integrator) -> Solver:

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.compiled_rotations import earth_from_body
 from colibri.common.jit import packed
 from colibri.common.matrices import inverse
-from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
@@ -20,7 +20,6 @@ from colibri.plant.physics.equations import (
     STATE,
     PlantParameters,
     attitude_of,
-    close_attitude,
     specific_force,
 )
 from colibri.plant.physics.integrators import Integrator, solver
@@ -68,9 +67,9 @@ class Physics:
         self.become(vehicle)
         self._held: list[float | None] | None = None
         self._standing: PerRotor = (0.0,) * vehicle.rotors.count
-        self._end: tuple[World | None, Array] = (None, np.array((*_LEVEL, *self._standing, 0.0)))
-        self._integrate(self._end[1], self._standing, self._parameters, _MOMENT_S)
-        close_attitude(self._end[1])
+        x = np.array((*_LEVEL, *self._standing, 0.0))
+        self._end: tuple[World | None, Array] = (None, x)
+        self._integrate(x, self._standing, self._parameters, _MOMENT_S, np.empty(x.size))
 
     def become(self, vehicle: Vehicle) -> None:
         """Fly another vehicle, in the same air."""
@@ -92,8 +91,10 @@ class Physics:
         target = self._target(command)
         if self._noise is not None:
             target = self._disturb(self._noise, target, time_us, duration_us)
-        x, voltage_v = self._integrate(self._vector(world), target, self._parameters, duration_us * 1e-6)
-        if not close_attitude(x):
+        start = self._vector(world)
+        x = np.empty(start.size)
+        voltage_v, is_finite = self._integrate(start, target, self._parameters, duration_us * 1e-6, x)
+        if not is_finite:
             when = f"at t = {time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
         end = x.tolist()

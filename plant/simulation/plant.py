@@ -76,7 +76,10 @@ class DelayedCommands:
         self._coming.append((from_us, command))
 
     def spans(self, begin_us: int, end_us: int) -> list[tuple[ActuatorCommand, int]]:
-        coming, spans = self._coming, []
+        coming = self._coming
+        if not coming:
+            return [(self.now, end_us - begin_us)]
+        spans = []
         while begin_us < end_us:
             while coming and coming[0][0] <= begin_us:
                 from_us, self.now = coming.popleft()
@@ -142,8 +145,11 @@ class Plant:
         self._repeats_after[self._repeated] = self._repeated = repeated
         if foreseen is not None and repeated:
             self._actuation.now, self.world = command, foreseen
-        else:
+        elif self._round_trip_us:
             self.arrive(self.world.time_us, command)
+            self.go_on()
+        else:
+            self._actuation.now, self._actuation.delay_us = command, 0
             self.go_on()
 
     def foresee(self) -> None:

@@ -116,7 +116,7 @@ def values(
         state = VehicleState((0.0, 0.0, 100.0), (u, v, w), attitude, euler_from_quaternion(attitude), (p, q, r))
         memory, decision = controller.step_attitude(memory, sample * 8000, state, demand)
         for _ in range(round(entry.numbers.interval_s / STEP_S)):
-            x, _ = fixed_step(x, tuple(decision.rotor_speeds.tolist()), parameters, STEP_S)
+            fixed_step(x, tuple(decision.rotor_speeds.tolist()), parameters, STEP_S, x)
             x[3:6] += STEP_S * moment_n_m / inertia
     return found
 
