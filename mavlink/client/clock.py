@@ -7,7 +7,7 @@ quicker by the possible drift since. A significant drift, as of simulators, is c
 from collections import deque
 from collections.abc import Iterable
 from math import sqrt
-from statistics import median
+from statistics import median, median_high
 from typing import NamedTuple
 
 NS_PER_US = 1000
@@ -40,13 +40,9 @@ class VehicleClock:
         self._best: Exchange | None = None
         self._drift = 0.0
         self.known = False
+        self.round_trip_us = 0
         self.answered_us: int | None = None
         self._answers: deque[tuple[int, int]] = deque(maxlen=_RATED)
-
-    @property
-    def round_trip_us(self) -> int:
-        trips = sorted(exchange.round_trip_us for exchange in self._exchanges)
-        return trips[len(trips) // 2] if trips else 0
 
     @property
     def rate(self) -> float:
@@ -89,6 +85,7 @@ class VehicleClock:
         while self._exchanges[0].received_us < now_us - WINDOW_US:
             self._exchanges.popleft()
         self.known = self.known or len(self._exchanges) >= ENOUGH
+        self.round_trip_us = median_high(exchange.round_trip_us for exchange in self._exchanges)
         self._drift = drift_of(self._exchanges)
         unsure = _DRIFT + _UNEVEN * abs(self._drift)
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))

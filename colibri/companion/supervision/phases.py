@@ -1,5 +1,6 @@
 """Phases of a companion, a table whose first row that holds applies; consistency of states, and rate of setpoints."""
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Sequence
 from enum import StrEnum
@@ -205,5 +206,5 @@ class SetpointRate:
         """Return the part of the last second's setpoints that was computed, 1 at first."""
         if now_us - self._began_us < _WINDOW_US:
             return 1.0
-        there = sum(1 for at_us in self._sent_us if at_us > now_us - _WINDOW_US)
+        there = len(self._sent_us) - bisect_right(self._sent_us, now_us - _WINDOW_US)
         return there * interval_us / _WINDOW_US
