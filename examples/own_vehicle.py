@@ -14,8 +14,8 @@ heavier = (
     .replace("body.inertia_kg_m2", [0.0038, 0.0038, 0.0066])
 )
 flights = {
-    "known": colibri.fly("spiral", vehicle=heavier, duration=30),
-    "plant only": colibri.fly("spiral", plant_vehicle=heavier, duration=30),
+    "known": colibri.fly("spiral", vehicle=heavier, duration=12),
+    "plant only": colibri.fly("spiral", plant_vehicle=heavier, duration=12),
 }
 for name, flight in flights.items():
     print(f"{name}: {1000 * flight.report['max_error_m']:.1f} mm at most, lost: {flight.lost}")

@@ -14,7 +14,7 @@ import numpy as np
 
 import colibri
 
-options = {"track": "lemniscate:lap=8", "duration": 12, "turbulence": "light", "seed": 5}
+options = {"track": "lemniscate:lap=8", "duration": 8, "turbulence": "light", "seed": 5}
 shutil.rmtree("out/replay", ignore_errors=True)
 colibri.fly(**options).save("out/replay")
 done = subprocess.run([sys.executable, "-m", "colibri", "replay", "--quiet", "out/replay"], check=False)
