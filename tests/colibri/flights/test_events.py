@@ -142,10 +142,10 @@ def test_events_without_effect_are_named() -> None:
         colibri.fly("hover", duration=0.1, events=["5:payload=0.2"])
 
 
-@pytest.mark.sitl(events=["5:payload=0.05", "8:setpoint=1,0,2.5", "8.2:mode=offboard", "12:mode=land"])
+@pytest.mark.sitl(events=["2:payload=0.05", "5:setpoint=1,0,2.5", "5.2:mode=offboard", "8:mode=land"])
 def test_the_fixture_flies_events_of_plant_and_station(sitl: colibri.Sitl) -> None:
     sitl.takeoff(2.0)
-    assert sitl.time_s < 8.0
+    assert sitl.time_s < 5.0
     sitl.wait_until(lambda: sitl.mode == "offboard" and sitl.is_at((1.0, 0.0, 2.5)), within=10.0)
     sitl.wait_until(lambda: sitl.mode == "land", within=10.0)
 

@@ -1,5 +1,6 @@
 """Policies as control laws: exported, flown, refused."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tests.support.refusals import refusal_of
 _GRAVITY_M_S2 = 9.81
 
 
+@cache
 def _linear(actions: int = 4) -> list[tuple[Any, Any]]:
     """Return one layer that hovers with body rates: observation to thrust, p, q, r."""
     vehicle = load_vehicle("hummingbird")
