@@ -138,9 +138,8 @@ class PlannedAttitude:
             states = np.zeros((self._horizon + 1, PREDICTED + len(self._from_wrench)))
             states[:, PREDICTED:] = self._squared(thrust_n, 0.0 * z[_COMMANDS])
             plan = Plan(np.tile(steady, (self._horizon, 1)), states)
-        tracked = law.initial(0.0).tracked._replace(
-            speeds=np.sqrt(self._squared(thrust_n, z[_MOMENTS])), charge_ah=self._charge_ah
-        )
+        tracked = law.initial(0.0).tracked._replace(charge_ah=self._charge_ah)
+        tracked.rotors[1] = np.sqrt(self._squared(thrust_n, z[_MOMENTS]))
         half = 0.5 * z[ANGLES]
         attitude = quaternion_product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))
         nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[RATES].tolist()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias,
 
 from colibri.autopilot.core.autopilot import Autopilot, Stages
 from colibri.autopilot.core.step import Received, Step, answer
-from colibri.common.types import Address
+from colibri.common.types import Address, PerRotor
 from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
@@ -34,13 +34,8 @@ Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 """Records frames of MAVLink: (simulated time in µs, frames)."""
 
 
-class Answered(NamedTuple):
-    """The answer as it reached the plant; `datagram` is empty if only rounded, `None` on `Direct`."""
-
-    step: Step
-    command: ActuatorCommand
-    faults: Sequence[Fault | WorldChange]
-    datagram: bytes | None
+Answered: TypeAlias = tuple[Step, ActuatorCommand, Sequence[Fault | WorldChange], bytes | None]
+"""Step, command and faults as they reached the plant, and the datagram: empty if only rounded, `None` on `Direct`."""
 
 
 class Wire(Protocol):
@@ -92,7 +87,7 @@ class Direct:
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         step = autopilot.step(*plant.measure())
-        return Answered(step, step.command, step.faults, None)
+        return step, step.command, step.faults, None
 
 
 def direct_flight(
@@ -120,6 +115,7 @@ class InMemory:
     ) -> None:
         self._traffic = traffic
         self._replayed = replayed
+        self._controls: tuple[PerRotor, PerRotor] = ((), ())  # of the last command, as sent and as received
         self.plant_end = PlantEnd(
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
         )
@@ -139,13 +135,12 @@ class InMemory:
             step = autopilot.step(received)
             self.autopilot_end.follow(now_us, encoded=bool(step.faults))
             if not step.faults:
-                command = command_as_received(step.command)
-                assert command is not None, "a control law's command is one that rotors can follow"
+                command = self._as_received(step.command)
                 if self._replayed and isinstance(frame, SensorFrame):
                     datagram = self.plant_end.encoded(frame)
                 else:
                     self.plant_end.skip()
-                return Answered(step, command, (), datagram)
+                return step, command, (), datagram
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()
             self.autopilot_end.answer(step.command, step.faults)
@@ -154,9 +149,17 @@ class InMemory:
             answered, datagram = self._to_autopilot(now_us, autopilot)
             assert answered is not None, "the autopilot answers every new frame"
             step = answered
-        command = self._to_plant(now_us)
-        assert command is not None, "the answer names the frame awaited"
-        return Answered(step, command, self.plant_end.take_faults(), datagram)
+        awaited = self._to_plant(now_us)
+        assert awaited is not None, "the answer names the frame awaited"
+        return step, awaited, self.plant_end.take_faults(), datagram
+
+    def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
+        time_us, controls, armed = command
+        if controls is not self._controls[0]:  # commands between control samples are repeated
+            received = command_as_received(command)
+            assert received is not None, "a control law's command is one that rotors can follow"
+            self._controls = (controls, received.controls)
+        return ActuatorCommand(time_us, self._controls[1], armed)
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
         return datagrams

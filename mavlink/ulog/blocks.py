@@ -11,7 +11,7 @@ import numpy as np
 from colibri.common.types import Array, Vector
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
-BLOCK_ROWS = 16  # of PX4's topics: 0.64 s
+BLOCK_ROWS = 32  # of PX4's topics: 1.28 s
 EVERY_US = 40_000  # interval of PX4's topics, for viewers: PX4's own or shorter
 
 

@@ -34,7 +34,7 @@ class Topic:
     table: str  # name of the CSV table
     rows: str  # meaning of a row
     columns: tuple[Columns, ...]  # all except the time
-    block_rows: int = 64  # rows written at once
+    block_rows: int = 128  # rows written at once
 
     @cached_property
     def names(self) -> tuple[str, ...]:

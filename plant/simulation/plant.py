@@ -7,7 +7,7 @@ from contextlib import suppress
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, judged
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus, ReceivedFrame
+from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PaceChange, PayloadChange, WindChange, WorldChange
@@ -76,10 +76,7 @@ class DelayedCommands:
         self._coming.append((from_us, command))
 
     def spans(self, begin_us: int, end_us: int) -> list[tuple[ActuatorCommand, int]]:
-        coming = self._coming
-        if not coming:
-            return [(self.now, end_us - begin_us)]
-        spans = []
+        coming, spans = self._coming, []
         while begin_us < end_us:
             while coming and coming[0][0] <= begin_us:
                 from_us, self.now = coming.popleft()
@@ -129,12 +126,12 @@ class Plant:
         self._repeated, self._repeats_after = False, {False: False, True: False}
         self._foreseen: World | None = None
 
-    def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
+    def measure(self, *, with_battery: bool = True) -> tuple[Frame, PlantStatus]:
         battery = self._physics.battery(self.world) if with_battery else None
         delay_us = self._actuation.delay_us or None
         alone = battery is None and delay_us is None and not self._results
         status = NOTHING if alone else PlantStatus(battery, self._results, delay_us)
-        return ReceivedFrame(self._measure(self.world), status)
+        return self._measure(self.world), status
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         self._results = ()
@@ -150,7 +147,9 @@ class Plant:
             self.go_on()
         else:
             self._actuation.now, self._actuation.delay_us = command, 0
-            self.go_on()
+            if self.world.time_us >= self._next_us:
+                self._happen()
+            self.world = self._physics.step(self.world, command, self.interval_us)
 
     def foresee(self) -> None:
         """Integrate the next frame before its command comes, if that is likely to repeat the last one."""

@@ -56,7 +56,7 @@ _SHARES, _ALWAYS = 3.0, 0.5
 times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
 
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
-_UPSIDE_DOWN, _NOTHING = (0.0, 1.0, 0.0, 0.0), np.empty(0)
+_UPSIDE_DOWN, _NOTHING, _UNKNOWN = (0.0, 1.0, 0.0, 0.0), np.empty(0), np.empty((0, 0))
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -219,15 +219,14 @@ class LpvMpc(AttitudeController[LawMemory]):
 
     def _observe(self, memory: LawMemory, state: VehicleState) -> Observed:
         """Observe the vehicle, and fill the start of a plan."""
-        (speeds, wrench, mean_wrench, before, estimate_before, charge_ah, mass_kg), plan, age, _, _ = memory
+        (rotors, before, estimate_before, charge_ah, mass_kg), plan, age, _, _ = memory
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
         position, velocity, attitude, (_, _, psi), rate, _, _, airborne = state
         measured, estimate = np.empty(MEASURED), np.empty(estimate_before.size)
         mass_kg, max_speed, current_a, max_n = planning.begin(
-            position, velocity, attitude, rate, speeds, wrench, mean_wrench, _NOTHING if before is None else before,
-            estimate_before, mass_kg, charge_ah, airborne,
-            plan.states[age:, PREDICTED:] if plan else (speeds * speeds)[None, :],
+            position, velocity, attitude, rate, rotors, _NOTHING if before is None else before, estimate_before,
+            mass_kg, charge_ah, airborne, _UNKNOWN if plan is None else plan.states[age:, PREDICTED:],
             self.tracker.model, self.tracker.battery.numbers, self._now, measured, estimate,
         )  # fmt: skip
         if estimate.size == ESTIMATES:

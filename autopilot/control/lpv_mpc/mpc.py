@@ -1,7 +1,7 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
 from math import inf, nan, radians
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import msgspec
 import numpy as np
@@ -65,14 +65,11 @@ class Plan(NamedTuple):
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
-class Corrections(NamedTuple):
-    """Result of the QPs of a plan."""
-
-    status: QpStatus  # of the last QP
-    z: Array | None  # changes of the corrections, (n,)
-    iterations: float  # 0 without a solver
-    slack: float = 0.0  # largest violation of a soft limit, in parts of it
-    binding: tuple[int, int] = (0, 0)  # active soft limits of tilt and of rates
+Corrections: TypeAlias = tuple[QpStatus, Array | None, float, float, tuple[int, int]]
+"""Status of the last QP; changes of the corrections, (n,); iterations, 0 without a solver; largest violation of a soft
+limit, in parts of it; active soft limits of tilt and of rates.
+"""
+_SOLVED, _NO_LIMITS = QpStatus.SOLVED, (0, 0)
 
 
 class _Qps(NamedTuple):
@@ -225,17 +222,17 @@ class Mpc:
         minimum = np.empty(len(free.f))
         is_free, is_beyond = planning.minimise(kind, minimum)
         if is_free and not is_beyond:
-            return Corrections(QpStatus.SOLVED, minimum, 0)
-        status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
+            return _SOLVED, minimum, 0, 0.0, _NO_LIMITS
+        status, z, iterations = QpResult(_SOLVED, minimum, 0) if is_free else self._solver.solve(free)
         if z is None or not (is_beyond or planning.is_beyond(kind, z)):
-            return Corrections(status, z, iterations)
+            return status, z, iterations, 0.0, _NO_LIMITS
         planning.limit(kind)
         status, z, more = self._solver.solve(limited)
         iterations += more
         if z is None:
-            return Corrections(status, z, iterations)
+            return status, z, iterations, 0.0, _NO_LIMITS
         slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
-        return Corrections(status, z[: len(free.f)].copy(), iterations, slack, soft)
+        return status, z[: len(free.f)].copy(), iterations, slack, soft
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

@@ -63,16 +63,18 @@ class QpKind(NamedTuple):
 
 @compiled
 def begin(
-    position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector, speeds: Array, wrench: Array,
-    mean_wrench: Array, before: Array, estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool,
-    expected: Array, tracker: Packed, battery: Packed, now: Packed, measured: Array, estimate: Array,
+    position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector, rotors: Array, before: Array,
+    estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool, expected: Array, tracker: Packed,
+    battery: Packed, now: Packed, measured: Array, estimate: Array,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Observe the vehicle, and fill the start of a plan; return mass, largest speed, current and largest thrust.
 
     Arguments are those of `VehicleState` and `Tracked`, `before` is (0,) at first. The power of `expected` squared
-    speeds, (n, m), limits the speeds. Filled are `measured` and `estimate` of `Observed`, and `now` except constants.
+    speeds, (n, m), or without them that of the present ones, limits the speeds. Filled are `measured` and `estimate` of
+    `Observed`, and `now` except constants.
     """
     start, model = now[0], tracker[0]
+    speeds, wrench, mean_wrench = rotors[1, : start.squared.shape[0]], rotors[2], rotors[3]
     rigid, R = start.rigid, rotation_matrix(attitude)
     for i in range(3):
         rigid[i], rigid[3 + i], rigid[10 + i] = position[i], velocity[i], rate[i]
@@ -95,6 +97,8 @@ def begin(
     for i in range(speeds.shape[0]):
         start.squared[i] = speeds[i] * speeds[i]
     open_v, speed = open_voltage_now(battery[0], charge_ah), common_speed(charge_ah, battery)
+    if expected.shape[0] == 0:
+        expected = start.squared.copy().reshape((1, -1))
     fill_limits(expected, open_v, battery, start.limits[:, 1])
     start.force.max_n = start.span_n * (speed * speed)
     voltage_v, current_a = terminal(open_v, speeds, battery)
@@ -194,36 +198,35 @@ def free_minimum(qp: Qp, blocks: int, rotors: int, z: Array) -> bool:
 
     Speeds along the path stay at their upper bounds, optimal while the vehicle is on time.
     """
-    n, inputs = z.shape[0], z.shape[0] // blocks
+    n, inputs = qp.f.shape[0], qp.f.shape[0] // blocks
     first_speed = rotors if inputs > rotors else n
-    L, left = np.empty((n, n)), np.empty(n)
+    U, left = qp.H.copy(), np.empty(n)  # the factor L, transposed; its loops run along rows, to be vectorised
     for i in range(n):
         left[i] = -qp.f[i]
         for k in range(first_speed, n, inputs):
             left[i] -= qp.H[i, k] * qp.upper[k]
-        speed = i % inputs == rotors
-        for j in range(i + 1):
-            total = qp.H[i, j]
-            if speed or j % inputs == rotors:
-                total = 1.0 if i == j else 0.0
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            if i > j:
-                L[i, j] = total / L[j, j]
-            elif total > 0.0:
-                L[i, i] = sqrt(total)
-            else:
-                return False
-    for i in range(n):
-        total = qp.upper[i] if i % inputs == rotors else left[i]
-        for k in range(i):
-            total -= L[i, k] * z[k]
-        z[i] = total / L[i, i]
+        z[i] = left[i]
+    for k in range(first_speed, n, inputs):
+        U[k, :] = 0.0
+        U[:, k] = 0.0
+        U[k, k], z[k] = 1.0, qp.upper[k]
+    for k in range(n):
+        if not U[k, k] > 0.0:
+            return False
+        U[k, k] = sqrt(U[k, k])
+        z[k] /= U[k, k]
+        for i in range(k + 1, n):
+            U[k, i] /= U[k, k]
+            z[i] -= U[k, i] * z[k]
+        for j in range(k + 1, n):
+            factor = U[k, j]
+            for i in range(j, n):
+                U[j, i] -= U[k, i] * factor
     for i in range(n - 1, -1, -1):
         total = z[i]
         for k in range(i + 1, n):
-            total -= L[k, i] * z[k]
-        z[i] = total / L[i, i]
+            total -= U[i, k] * z[k]
+        z[i] = total / U[i, i]
     for i in range(n):
         if not qp.lower[i] <= z[i] <= qp.upper[i]:
             return False

@@ -25,9 +25,7 @@ _WRENCH = 4
 
 
 class Tracked(NamedTuple):
-    speeds: Array  # of the rotors, parts of the largest, (m,)
-    wrench: Array  # now: U1, N, and U2..U4, N m, (4,)
-    mean_wrench: Array  # over the interval that ends now, (4,)
+    rotors: Array  # rows: commands, vehicle's unit; speeds, parts of the largest; wrench; its last mean; (4, m >= 4)
     measured: Array | None  # by the observer a sample ago, (9,)
     estimate: Array  # of the observer a sample ago, (12,)
     charge_ah: float
@@ -65,23 +63,19 @@ class VehicleTracker:
         self._interval_s = interval_s
         self.model = packed(TrackerModel(momentum, observing, mass_model(mass, vehicle, interval_s)))
         self._rotors = packed(RotorModel(self.lag, self.allocation, vehicle.rotors.max_speed))
-        self._rotor_count = vehicle.rotors.count
-        self._actuated = (4, max(self._rotor_count, _WRENCH))
+        self._actuated = (4, max(vehicle.rotors.count, _WRENCH))
 
     def initial(self, rotor_speed: float) -> Tracked:
-        speeds = np.full(self.vehicle.rotors.count, rotor_speed / self.vehicle.rotors.max_speed)
+        rotors, count = np.zeros(self._actuated), self.vehicle.rotors.count
+        rotors[1, :count] = rotor_speed / self.vehicle.rotors.max_speed
+        rotors[2:, :_WRENCH] = matvec(self.allocation, rotors[1, :count] * rotors[1, :count])
         learned = LEARNED if self.vehicle.drag and self.vehicle.drag.learned else 0
-        wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES + learned)
-        return Tracked(speeds, wrench, wrench, None, estimate, 0.0, self.vehicle.body.mass_kg)
+        return Tracked(rotors, None, np.zeros(ESTIMATES + learned), 0.0, self.vehicle.body.mass_kg)
 
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state."""
-        actuated = np.empty(self._actuated)
-        rotor_lag.actuate(tracked.speeds, squared, observed.max_speed, self._rotors, actuated)
-        commands, speeds, wrench, mean_wrench = actuated
-        if self._rotor_count != _WRENCH:
-            commands, speeds = commands[: self._rotor_count], speeds[: self._rotor_count]
-            wrench, mean_wrench = wrench[:_WRENCH], mean_wrench[:_WRENCH]
-        charge_ah = charged(tracked.charge_ah, observed.current_a, self._interval_s)
-        seen = observed.measured, observed.estimate
-        return commands, Tracked(speeds, wrench, mean_wrench, *seen, charge_ah, observed.mass_kg)
+        measured, estimate, mass_kg, max_speed, current_a, _, _, _ = observed
+        rotors = np.empty(self._actuated)
+        rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
+        charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
+        return rotors[0, : squared.size], Tracked(rotors, measured, estimate, charge_ah, mass_kg)

@@ -61,9 +61,10 @@ def lead(speeds: Array, squared_commands: Array, lag: SampledLag, max_speed: flo
 
 
 @compiled
-def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Packed, out: Array) -> None:
-    """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, (4, m or more)."""
-    lag, allocation, rotors = packed[0].lag, packed[0].allocation, speeds.shape[0]
+def actuate(before: Array, squared_commands: Array, max_speed: float, packed: Packed, out: Array) -> None:
+    """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, as in `before`."""
+    lag, allocation, rotors = packed[0].lag, packed[0].allocation, packed[0].allocation.shape[1]
+    speeds = before[1, :rotors]
     commands, after, wrench, mean = out[0, :rotors], out[1, :rotors], out[2], out[3]
     put(lead(speeds, squared_commands, lag, max_speed), commands)
     put(follow(speeds, commands, lag), after)

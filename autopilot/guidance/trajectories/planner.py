@@ -37,7 +37,7 @@ class Planner:
         if block != self._block:
             self._block, self.table = block, self._tabulate(block)
         ahead = slice(first, first + self.preview.samples)
-        return Horizon._make([column[ahead] for column in self.table])
+        return Horizon(*[column[ahead] for column in self.table])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
         """Return a horizon between instants `grid_us` apart, extrapolated from the one before."""

@@ -101,7 +101,7 @@ def values(
     x[9] = np.sqrt(1.0 - (x[10:13] ** 2).sum())
     x[13:17] = speeds * VEHICLE.rotors.max_speed
     tracked = controller.initial(VEHICLE.hover_speed).tracked
-    memory = memory_of(tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench), start[9:].copy())
+    memory = memory_of(tracked._replace(rotors=np.stack([speeds, speeds, wrench, wrench])), start[9:].copy())
     count = controller.preview.samples
     demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, HOVER_N))
     found = []
@@ -109,7 +109,7 @@ def values(
         attitude, (p, q, r) = attitude_of(x.tolist()), x[3:6].tolist()
         z = np.zeros(12)
         z[[0, 2, 4]], z[[1, 3, 5]] = errors_of(attitude), (p, q, r)
-        z[6:9], z[9:] = memory.tracked.wrench[1:], remembered(memory)
+        z[6:9], z[9:] = memory.tracked.rotors[2, 1:], remembered(memory)
         found.append(float(z @ entry.proof.P @ z))
         moment_n_m = disturbance(sample, z)
         u, v, w = x[:3].tolist()

@@ -139,7 +139,7 @@ def test_the_truth_is_in_ned_and_frd() -> None:
     assert fields(escs, "esc_count esc_online_flags esc[0].esc_rpm esc[1].esc_rpm", -1) == [4, 15, 0, 5000]
     battery = data(log, topics.BATTERY)
     assert battery["current_a"].tolist() == pytest.approx([-1.0, *[0.001 / 0.004 * 3600.0] * 2])
-    assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 31.0, 0.9845])
+    assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 63.0, 0.9685])
 
 
 def test_extreme_numbers_and_a_missing_battery_are_written() -> None:

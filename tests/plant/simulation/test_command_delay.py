@@ -63,6 +63,6 @@ def test_a_plant_says_how_late_the_last_command_took_effect() -> None:
         plant = hovering(latency_us)
         delays = []
         for _ in said:
-            delays.append(plant.measure().plant_status.delay_us)
+            delays.append(plant.measure()[1].delay_us)
             plant.answer(ActuatorCommand(plant.world.time_us, (0.5,) * 4, armed=True))
         assert delays == said
