@@ -83,7 +83,8 @@ class Pool:
                         break
                 if not waiting:
                     break
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                done = wait(waiting, return_when=FIRST_COMPLETED).done
+                for future in [each for each in waiting if each in done]:
                     job = waiting.pop(future)
                     if isinstance(future.exception(), BrokenProcessPool):
                         broken.append(job)
