@@ -2,7 +2,9 @@
 
 import gc
 import signal
+import threading
 
+import pytest
 from hypothesis import settings
 
 from colibri.common.process.lifecycle import freeze_once, use_one_thread
@@ -17,7 +19,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_finish() -> None:
-    """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
+    """Keep the garbage collector from what five thousand tests load: it would look at it again and again.
+
+    Flights over UDP fork, as those of users do, although threads of pytest-xdist and jemalloc wait in this process.
+    """
+    pytest.MonkeyPatch().setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
     gc.collect()
     freeze_once()
     gc.set_threshold(20_000, 20, 20)
