@@ -106,20 +106,17 @@ class Autopilot(Generic[StagesT]):
             return Step(standing, None, self._clock() - started_s, known=False)
         stages.enter(known, now_us, begins=begins)
         flown: ControlSample | None = None
-        decision = estimate = None
+        decision = estimate = asked = references = None
         if due:
             flown = stages.guard(STEP, self._sample, nothing, known, now_us)
             decision = stages.rescue(known, now_us) if flown is None else flown.decision
-            estimate = stages.state_source.estimate
+            estimate, asked = stages.state_source.estimate, frame
         command = stages.actuate(now_us)
         stages.delay.sent(command)
         duration_s = self._clock() - started_s
-        if flown is None:
-            references = None
-        else:
+        if flown is not None:
             references = flown.guidance.horizon
             stages.sampled(flown, duration_s)
-        asked = frame if due else None
         faults, delay_us = stages.faults(), stages.delay.delay_us
         return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
 

@@ -155,7 +155,7 @@ class InMemory:
 
     def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
         time_us, controls, armed = command
-        if controls is not self._controls[0]:  # commands between control samples are repeated
+        if controls != self._controls[0]:  # else repeated, as between two control samples
             received = command_as_received(command)
             assert received is not None, "a control law's command is one that rotors can follow"
             self._controls = (controls, received.controls)

@@ -37,6 +37,7 @@ def fly_locally(
         replayed, rotors = log.topics.for_viewers, plan.plant_vehicle.rotors.count
         wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=record, replayed=replayed, rotors=rotors)
     frames, pace = 0, plan.spec.pace
+    is_paced = isfinite(pace)
     try:
         truth.write_world(plant.world)
         with gc_frozen():
@@ -46,7 +47,7 @@ def fly_locally(
                 truth.write_world(sample.world)
                 frames += 1
                 progress(sample.world.time_us / 1e6)
-                if isfinite(pace):
+                if is_paced:
                     sleep(max(0.0, began_s + sample.world.time_us / 1e6 / pace - perf_counter()))
             log.flush()
             wall_time_s = perf_counter() - began_s

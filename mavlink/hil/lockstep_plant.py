@@ -52,7 +52,7 @@ class PlantEnd:
         self.notes: list[str] = []  # for people; the owner clears it
         self._is_there, self._note_at_s = is_there, 0.0
         self.frame_interval_us = frame_interval_us
-        self.feedback = Feedback.STATE
+        self.feedback, self._messages = Feedback.STATE, state.STATE_MESSAGES
         self._serves = frozenset(serves)
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -130,7 +130,7 @@ class PlantEnd:
 
     def skip(self) -> None:
         """Count a frame that was not encoded, for the numbers of later ones."""
-        self._codec.skip(state.STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
+        self._codec.skip(self._messages)
 
     def encoded(self, frame: SensorFrame) -> bytes:
         return b"".join(encode_sensors(self._codec, frame))
@@ -211,6 +211,7 @@ class PlantEnd:
         if self._begun and (feedback, interval_us) != (self.feedback, self.frame_interval_us):
             return dialect.RESULT_TEMPORARILY_REJECTED
         self.feedback, self.frame_interval_us = feedback, int(interval_us)
+        self._messages = state.STATE_MESSAGES if feedback is Feedback.STATE else 1
         return dialect.RESULT_ACCEPTED
 
     def _note(self, frame: bytes, now_s: float) -> None:

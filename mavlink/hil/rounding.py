@@ -5,14 +5,14 @@ from typing import TypeAlias
 
 import numpy as np
 
+from colibri.common.compiled_rotations import QUATERNION, VECTOR
 from colibri.common.jit import compiled, compiled_for
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.state import UNIT_NORM_TOLERANCE, StateFrame
 from colibri.mavlink.wire import ned
 
 _Motion: TypeAlias = tuple[Vector, Vector, Quaternion, Vector]
-_VECTOR, _QUATERNION = "UniTuple(float64, 3)", "UniTuple(float64, 4)"
-_MOTION = f"{_VECTOR}, {_VECTOR}, {_QUATERNION}, {_VECTOR}"
+_MOTION = f"{VECTOR}, {VECTOR}, {QUATERNION}, {VECTOR}"
 
 _turned = compiled(ned.ned_frd_from_enu_flu)
 

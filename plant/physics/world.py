@@ -5,23 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.common.compiled_rotations import earth_from_body
-from colibri.common.jit import packed
+from colibri.common.compiled_rotations import QUATERNION, VECTOR, earth_from_body
+from colibri.common.jit import compiled_for, packed
 from colibri.common.matrices import inverse
-from colibri.common.types import Array, PerRotor, Vector
+from colibri.common.types import Array, PerRotor, Quaternion, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.random_streams import Noise
 from colibri.plant.environment.turbulence import CALM, Air, Eddies
 from colibri.plant.environment.weather import NO_WEATHER, RecordedWind, Weather, Wind
-from colibri.plant.physics.equations import (
-    CHARGE,
-    ROTORS,
-    STATE,
-    PlantParameters,
-    attitude_of,
-    specific_force,
-)
+from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, PlantParameters, attitude_of, specific_force
 from colibri.plant.physics.integrators import Integrator, solver
 from colibri.plant.physics.start import IntegrationError, Start, check_start
 from colibri.plant.vehicle.description import Vehicle
@@ -77,6 +70,7 @@ class Physics:
         self._as_built = self._parameters.copy()
         self._power: list[float] = self._parameters["power"][0].tolist()
         self._idle, self._top, self._battery = vehicle.rotors.idle_speed, vehicle.rotors.max_speed, vehicle.battery
+        self._followed: tuple[PerRotor, PerRotor] = ((), ())  # last controls of armed rotors, and their speeds
 
     @property
     def is_steady(self) -> bool:
@@ -162,8 +156,11 @@ class Physics:
     def _target(self, command: ActuatorCommand) -> PerRotor:
         target = self._standing
         if command.armed:
-            idle, top = self._idle, self._top
-            target = tuple([speed if (speed := control * top) > idle else idle for control in command.controls])
+            if command.controls != self._followed[0]:  # else repeated, as between two control samples
+                idle, top, controls = self._idle, self._top, command.controls
+                speeds = tuple([speed if (speed := control * top) > idle else idle for control in controls])
+                self._followed = (controls, speeds)
+            target = self._followed[1]
         if self._held is None:
             return target
         return tuple(free if held is None else held for free, held in zip(target, self._held, strict=True))
@@ -222,6 +219,11 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
 
 
 def state_frame(world: World) -> StateFrame:
-    u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = world.state
+    return StateFrame(world.time_us, *_motion(world.state))
+
+
+@compiled_for(f"Tuple(({VECTOR}, {VECTOR}, {QUATERNION}, {VECTOR}))(UniTuple(float64, {_RIGID}))")
+def _motion(state: State) -> tuple[Vector, Vector, Quaternion, Vector]:
+    u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = state
     attitude = (qw, qx, qy, qz)
-    return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))
+    return (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r)

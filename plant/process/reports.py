@@ -92,13 +92,13 @@ class TruthLog:
             self._blocks = TruthBlocks(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count)
 
     def write_world(self, world: World) -> None:
-        speeds, others = split(world.rotor_speeds)
-        battery = (world.voltage_v, world.charge_used_ah)
-        row = (world.time_us / 1e6, *world.state, *speeds, *battery, *world.wind_enu_m_s)
+        time_us, state, rotors, charge_ah, voltage_v, wind, _ = world
+        speeds, others = split(rotors)
+        row = (time_us / 1e6, *state, *speeds, voltage_v, charge_ah, *wind)
         self._log.add(TRUTH, row)
         if others:
             self._log.add(MORE_TRUTH, (row[0], *others))
-        if self._blocks and self._thinning.is_due(world.time_us):
+        if self._blocks and self._thinning.is_due(time_us):
             self._log.add(self._blocks, (*row, *others))
 
 

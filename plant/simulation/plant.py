@@ -222,17 +222,11 @@ class PlantBuilder:
         self._origin = origin
 
     def build(self, feedback: Feedback, interval_us: int) -> Plant:
+        latency_us, world = round(self._spec.latency * 1e3), self._worlds[feedback]
         return Plant(
-            self._worlds[feedback],
-            self.vehicle,
-            self._physics,
-            feedback,
-            self._origin,
-            seed=self._spec.seed,
-            interval_us=interval_us,
-            latency_us=round(self._spec.latency * 1e3),
-            events=self._spec.events,
-        )
+            world, self.vehicle, self._physics, feedback, self._origin,
+            seed=self._spec.seed, interval_us=interval_us, latency_us=latency_us, events=self._spec.events,
+        )  # fmt: skip
 
 
 def _held(world: World, vehicle: Vehicle) -> ActuatorCommand:

@@ -241,11 +241,32 @@ class LpvMpc(AttitudeController[LawMemory]):
     def _decide(
         self, memory: LawMemory, observed: Observed, wanted: Wanted, *, on_track: bool = True
     ) -> tuple[LawMemory, Decision]:
-        squared, plan, age, how = self._choose(memory, observed, wanted, on_track=on_track)
-        commands, after = self.tracker.actuate(memory.tracked, observed, squared)
-        lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
-        _, _, phi, theta, psi = wanted.aim
-        memory = LawMemory(after, plan, age, lag_us, wanted.deviation)
+        (tracked, before, age, lag_us, _), (target, aim, path, deviation) = memory, wanted
+        along_n, force_n, phi, theta, psi = aim
+        mass_kg, path_lag_s = observed.mass_kg, lag_us * 1e-6 if path else nan
+        plan: Plan | None = None
+        recovers = along_n < _RECOVER_BEYOND * force_n and not _planned(memory, observed)
+        if recovers:
+            how = Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s)
+        else:
+            most = inf
+            if self._force.upright or not observed.airborne:
+                most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
+            last = before.commands[age:] if before else None
+            plan, how = self._mpc.plan(
+                self._now, target, last, observed.psi, most, path,
+                on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s,
+            )  # fmt: skip
+        if plan is not None:
+            squared, age = plan.commands[0], 1
+        elif before is not None and not recovers and age <= min(self._shifted_samples, self._mpc.horizon - 1):
+            squared, plan, age = before.commands[age], before, age + 1
+            how = how._replace(fallback=Fallback.SHIFTED_PLAN)
+        else:
+            squared, age, how = self._recover(observed), 0, how._replace(fallback=Fallback.RECOVERY)
+        commands, after = self.tracker.actuate(tracked, observed, squared)
+        lag_us = self._lag_us(lag_us, plan, age) if path else 0
+        memory = LawMemory(after, plan, age, lag_us, deviation)
         return memory, Decision(commands, (phi, theta, nearest_turn(psi, observed.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
@@ -254,36 +275,14 @@ class LpvMpc(AttitudeController[LawMemory]):
         passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])
         return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
 
-    def _choose(
-        self, memory: LawMemory, observed: Observed, wanted: Wanted, *, on_track: bool
-    ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        target, (along_n, force_n, _, _, _), path, _ = wanted
-        mass_kg, path_lag_s = observed.mass_kg, memory.lag_us * 1e-6 if path else nan
-        if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, observed):
-            return self._recover(observed, Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s))
-        most = inf
-        if self._force.upright or not observed.airborne:
-            most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
-        last = memory.plan.commands[memory.age :] if memory.plan else None
-        plan, diagnostics = self._mpc.plan(
-            self._now, target, last, observed.psi, most, path,
-            on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s,
-        )  # fmt: skip
-        if plan is not None:
-            return plan.commands[0], plan, 1, diagnostics
-        if memory.plan is not None and memory.age <= min(self._shifted_samples, self._mpc.horizon - 1):
-            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
-            return memory.plan.commands[memory.age], memory.plan, memory.age + 1, how
-        return self._recover(observed, diagnostics)
-
-    def _recover(self, observed: Observed, diagnostics: Diagnostics) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Turn the thrust axis to the force the shortest way."""
+    def _recover(self, observed: Observed) -> Array:
+        """Return squared speeds that turn the thrust axis to the force the shortest way."""
         force, rates = self._targets.force, self._arrays.rigid[10:]
         rotation = np.array(rotation_matrix(tuple(self._arrays.rigid[6:10].tolist())))
         moments = turning_moment(matvec(rotation.T, force / norm(force)), rates, self.tracker.inertia, self._turn)
         thrust_n = max(dot(force, observed.measured[6:]), 0.0)
-        squared = mix_with_priority(thrust_n, moments, self._mixing, *self._arrays.limits[0].tolist())
-        return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
+        squared: Array = mix_with_priority(thrust_n, moments, self._mixing, *self._arrays.limits[0].tolist())
+        return squared
 
 
 def _planned(memory: LawMemory, observed: Observed) -> bool:

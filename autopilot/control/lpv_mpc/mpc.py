@@ -69,15 +69,16 @@ Corrections: TypeAlias = tuple[QpStatus, Array | None, float, float, tuple[int, 
 """Status of the last QP; changes of the corrections, (n,); iterations, 0 without a solver; largest violation of a soft
 limit, in parts of it; active soft limits of tilt and of rates.
 """
-_SOLVED, _NO_LIMITS = QpStatus.SOLVED, (0, 0)
+_SOLVED, _NO_LIMITS, _INACTIVE = QpStatus.SOLVED, (0, 0), Active()
 
 
 class _Qps(NamedTuple):
-    """A packed `QpKind`, and the two QPs in its memory."""
+    """A packed `QpKind`, the two QPs in its memory, and room for the minimum of the first."""
 
     kind: Packed
     free: Qp
     limited: Qp
+    minimum: Array
 
 
 class Mpc:
@@ -200,7 +201,7 @@ class Mpc:
         commands = np.empty((self.horizon, rotors))
         states = np.empty((self.horizon + 1, planning.PREDICTED + rotors))
         binding = planning.read(qps.kind, z, psi, commands, states)
-        active = Active(binding, 0, *soft)
+        active = Active(binding, 0, *soft) if binding or soft is not _NO_LIMITS else _INACTIVE
         diagnostics = Diagnostics(
             status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )
@@ -214,12 +215,11 @@ class Mpc:
         planning.is_beyond(self._on_clock.kind, z)
         planning.count_active(self._on_clock.kind, z)
 
-    def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
+    def solve(self, kind: Packed, free: Qp, limited: Qp, minimum: Array) -> Corrections:
         """Return the optimal changes of the corrections.
 
         An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again.
         """
-        minimum = np.empty(len(free.f))
         is_free, is_beyond = planning.minimise(kind, minimum)
         if is_free and not is_beyond:
             return _SOLVED, minimum, 0, 0.0, _NO_LIMITS
@@ -277,4 +277,5 @@ def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
 
 def _opened(kind: QpKind) -> _Qps:
     record = packed(kind)
-    return _Qps(record, opened(record["qp"], Qp), opened(record["limited"], Qp))
+    free, limited = opened(record["qp"], Qp), opened(record["limited"], Qp)
+    return _Qps(record, free, limited, np.empty(len(free.f)))
