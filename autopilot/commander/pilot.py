@@ -61,6 +61,7 @@ class Sensed(NamedTuple):
 
     Attributes:
         push: Tilting moment then that the rotors do not cause, over that of a quarter of the weight at a rotor.
+        jolt_s: Recent impulse along body z then that the rotors do not cause, in seconds of weight.
     """
 
     now_us: int = 0
@@ -72,6 +73,7 @@ class Sensed(NamedTuple):
     path_speed: float = 1.0  # rate of path time relative to the clock
     lift: float | None = None  # modelled thrust over weight, once a sensor has failed
     push: float = 0.0
+    jolt_s: float = 0.0
     drifts: bool = False  # the speed is not measured
 
 
@@ -328,7 +330,7 @@ class Pilot:
             return False
         comes_down = self.state.mode is Mode.LAND or is_below(generator.reference.height_m, vehicle)
         return comes_down and self.ground.watch_forces(
-            sensed.now_us, vehicle, sensed.lift, sensed.push, generator.interval_s
+            sensed.now_us, vehicle, sensed.lift, sensed.push, sensed.jolt_s, generator.interval_s
         )
 
     def _rest(self) -> Guidance:

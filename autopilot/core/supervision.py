@@ -46,13 +46,15 @@ class Supervision:
         steered, position_known = guard(table.SETPOINTS, self._sensed, lambda: (NOT_STEERED, True), now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
-        lift, push, watch = None, 0.0, parts.rotor_loss.watch
+        lift, push, jolt_s, watch = None, 0.0, 0.0, parts.rotor_loss.watch
+        estimate = parts.state_source.estimate
         if self._doubts:
             lift, push = watch.expected[2] / parts.loop.vehicle.gravity_m_s2, watch.push
-        estimate = parts.state_source.estimate
+            if estimate is not None and estimate.health.accelerometer and not estimate.health.gyroscope:
+                jolt_s = watch.jolt_s
         drifts = not position_known or (estimate is not None and not estimate.speed_known)
         parts.pilot.sense(
-            Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push, drifts)
+            Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift, push, jolt_s, drifts)
         )
         guard(table.FAILSAFES, self._execute, table.nothing, now_us, state)
         if self._caught_us is not None:

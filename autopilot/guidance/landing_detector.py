@@ -26,6 +26,7 @@ HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its co
 KNOCK_SAMPLES = 6
 _KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0  # velocity change within so many samples, and acceleration, of a contact alone
 HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0  # missing height after a fall, and largest distance from the last standing place
+_JOLTED_S = 0.08  # impulse of a descent that the ground ends, in seconds of weight
 _PUSHED = 0.5  # moment of feet, in parts of a quarter of the weight at a rotor; in the air below 0.15
 
 STANDING_BELOW_M = 0.5
@@ -162,9 +163,9 @@ def is_held_down(wanted_m: float, state: VehicleState, ground_m: float) -> bool:
     return z < wanted_m - HELD_DOWN_M and abs(z - ground_m) < NEAR_GROUND_M
 
 
-def is_touching(push: float, state: VehicleState, ground_m: float) -> bool:
-    """Whether a moment comes from feet on the ground, which must be near: a failed rotor pushes, too."""
-    return push > _PUSHED and abs(state.position_enu_m[2] - ground_m) < NEAR_GROUND_M
+def is_touching(push: float, jolt_s: float, state: VehicleState, ground_m: float) -> bool:
+    """Whether a moment or a jolt comes from feet on the ground, which must be near: a failed rotor pushes, too."""
+    return (push > _PUSHED or jolt_s > _JOLTED_S) and abs(state.position_enu_m[2] - ground_m) < NEAR_GROUND_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:

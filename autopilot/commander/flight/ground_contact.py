@@ -123,11 +123,13 @@ class GroundContact:
             self.land(now_us)
         return stands and fell
 
-    def watch_forces(self, now_us: int, vehicle: VehicleState, lift: float, push: float, interval_s: float) -> bool:
+    def watch_forces(
+        self, now_us: int, vehicle: VehicleState, lift: float, push: float, jolt_s: float, interval_s: float
+    ) -> bool:
         """Detect ground by forces while the vehicle comes down; return whether the contact was an impact."""
         climb_m_s = vehicle.velocity_enu_m_s[2]
         self._lack = self._lack.after(lift, climb_m_s, interval_s)
-        touches = is_touching(push, vehicle, self.height_m)
+        touches = is_touching(push, jolt_s, vehicle, self.height_m)
         if self.standing or not (touches or self._lack.is_carried(climb_m_s)):
             return False
         self.land(now_us)

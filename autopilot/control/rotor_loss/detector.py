@@ -34,6 +34,7 @@ _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of in
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
 _PUSH_PART, _MAX_PUSH = 0.25, 1.0  # filter gain and bound of a moment that the rotors do not cause
+_MAX_JOLT, _JOLT_PART = 3.0, 0.1  # bounds of a force that the rotors do not cause, in parts of the weight
 _DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
 # Deviations of the residual by errors of the model, in parts of a quarter of the weight and its moments.
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
@@ -92,6 +93,7 @@ class DetectorState(NamedTuple):
     noise: Array  # variances of the residual's changes, (4,)
     usual: Array  # mean of the residual force, N, (1,)
     push: Array  # filtered residual moments about x and y, and their means, in parts of a quarter of the weight's, (4,)
+    jolt: Array  # recent impulse along z, s of weight, and the mean of its force, parts of the weight, (2,)
 
 
 class RotorWatch:
@@ -100,7 +102,7 @@ class RotorWatch:
         self.lost: int | None = None  # index, permanently
         self.max_evidence = 0.0
         rotors = vehicle.rotors.count
-        self._memory = packed(DetectorState(*map(np.zeros, (rotors, 9, rotors, rotors, 4, 4, 1, 4))))
+        self._memory = packed(DetectorState(*map(np.zeros, (rotors, 9, rotors, rotors, 4, 4, 1, 4, 2))))
         self._kept = opened(self._memory, DetectorState)
         self.adopt(vehicle)
         stopped = vehicle.rotors.stopped
@@ -130,6 +132,11 @@ class RotorWatch:
         x, y, *_ = self._kept.push.tolist()
         return max(abs(x), abs(y)) if self.lost is None else 0.0
 
+    @property
+    def jolt_s(self) -> float:
+        """Recent impulse along body z that the rotors do not cause, as by the ground, in seconds of weight."""
+        return float(self._kept.jolt[0])
+
     def adopt(self, vehicle: Vehicle) -> None:
         self._battery, self._airframe = BatteryModel(vehicle), airframe_of(vehicle)
         signature = signature_of(vehicle, self._interval_s)
@@ -141,7 +148,7 @@ class RotorWatch:
         kept = self._kept
         self.speeds = np.array(controls)
         kept.evidence[:] = kept.odds[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
-        kept.push[:] = 0.0
+        kept.push[:] = kept.jolt[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: PerRotor, charge_ah: float, *, airborne: bool) -> int | None:
@@ -186,6 +193,7 @@ def _take_in(
         kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
     residual, expected, thrust_n = _residual(kept, before, speeds_before, known)
     _feel_push(kept.push, residual, known.variances)
+    _feel_jolt(kept.jolt, residual[0] / (known.mass_kg * known.gravity_m_s2), known.interval_s)
     if not counts:
         kept.evidence[:] = kept.odds[:] = kept.usual[:] = 0.0
         return 0, 0.0
@@ -229,6 +237,13 @@ def _feel_push(push: Array, residual: Array, variances: Array) -> None:
         part = _TILT_PART * residual[1 + i] / sqrt(variances[1 + i])
         push[i] += _PUSH_PART * (min(max(part - push[2 + i], -_MAX_PUSH), _MAX_PUSH) - push[i])
         push[2 + i] += _USUAL_PART * min(max(part - push[2 + i], -_TILT_PART), _TILT_PART)
+
+
+@compiled
+def _feel_jolt(jolt: Array, force: float, interval_s: float) -> None:
+    beyond = min(max(force - jolt[1], -_MAX_JOLT), _MAX_JOLT)
+    jolt[0] = max(jolt[0] + (beyond - _JOLT_PART) * interval_s, 0.0)
+    jolt[1] += _USUAL_PART * min(max(beyond, -_JOLT_PART), _JOLT_PART)
 
 
 @compiled

@@ -14,8 +14,8 @@ Expected: TypeAlias = tuple[float, float, float, float, float, float]  # of a `M
 Sample = tuple[float, ...]  # columns of `eskf_predict.SAMPLE`
 
 _BEYOND_RANGE = 1.01  # tolerance for resolution at the end of the range
-_PATIENCE_US = 100_000
 _BRIDGED_US = 20_000  # validity of the last good value when values are missing
+_FROZEN_US = 12_000  # the same when it is repeated, though it has noise: a frozen turn would be flown against
 _NOISY_1_S = 10.0  # bandwidth at which the model follows a noisy gyroscope
 _MAX_STEP_S = 0.02
 _FAILED_US = 100_000  # a sensor without values for so long has failed: those that come later may be late
@@ -27,20 +27,22 @@ class InertialSensor:
     def __init__(self, source: RejectedSource, group: int, maximum: float, noise: float) -> None:
         self._group = group
         maximum *= _BEYOND_RANGE
-        self._watch = Watch(source, -maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
-        self._time_us: int | None = None
+        self._watch = Watch(source, -maximum, maximum, _FROZEN_US if noise > 0.0 else inf)
+        self._repeats = noise == 0.0
+        self.time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
         self.failed = self.noisy = False
 
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
-        if frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected):
-            self.value, self._time_us = value, frame.time_us
+        accepted = frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected)
+        if accepted and (self._watch.is_new or self._repeats):
+            self.value, self.time_us = value, frame.time_us
             return not self.failed
-        if self._time_us is None:
+        if self.time_us is None:
             return False
-        late_us = frame.time_us - self._time_us
+        late_us = frame.time_us - self.time_us
         self.failed = self.failed or late_us > _FAILED_US
-        return late_us <= _BRIDGED_US and not self.failed
+        return late_us <= (_FROZEN_US if accepted else _BRIDGED_US) and not self.failed
 
 
 class InertialReading(NamedTuple):
@@ -80,7 +82,7 @@ class Inertial:
         if not force_good:
             reading = reading._replace(force=(across, along, thrust_m_s2), force_modelled=True)
         if not rate_good:
-            before_us, (p, q, r) = self._turns or (frame.time_us, reading.rate)
+            before_us, (p, q, r) = self._turns or (self.gyroscope.time_us or frame.time_us, reading.rate)
             dt = min((frame.time_us - before_us) * 1e-6, _MAX_STEP_S)
             rate = (p + turn[0] * dt, q + turn[1] * dt, r + turn[2] * dt)
             if self.gyroscope.noisy:

@@ -31,10 +31,13 @@ def test_ground_carries_what_lacks_lift(
     assert (carried_s is None) if within_s is None else (carried_s is not None and carried_s < within_s)
 
 
-@pytest.mark.parametrize(("push", "height_m", "touches"), [(0.8, 0.4, True), (0.2, 0.0, False), (0.8, 5.0, False)])
-def test_feet_push_near_the_ground_only(push: float, height_m: float, touches: bool) -> None:
+@pytest.mark.parametrize(
+    ("push", "jolt_s", "height_m", "touches"),
+    [(0.8, 0.0, 0.4, True), (0.0, 0.1, 0.4, True), (0.2, 0.02, 0.0, False), (0.8, 0.1, 5.0, False)],
+)
+def test_feet_push_and_jolt_near_the_ground_only(push: float, jolt_s: float, height_m: float, touches: bool) -> None:
     state = AT_REST._replace(position_enu_m=(0.0, 0.0, height_m))
-    assert is_touching(push, state, 0.0) is touches
+    assert is_touching(push, jolt_s, state, 0.0) is touches
 
 
 @pytest.mark.parametrize(

@@ -116,6 +116,18 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
     assert sitl.tilt_deg < 5.0
 
 
+@pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
+def test_a_gyroscope_that_freezes_in_a_turn_is_not_flown_against(sitl: Sitl) -> None:
+    sitl.takeoff(5.0)
+    sitl.goto(40.0, 0.0, 5.0, wait=False)
+    sitl.run(3.0)
+    sitl.goto(-40.0, 0.0, 5.0, wait=False)
+    sitl.run(0.15)
+    sitl.inject("gyro", "stuck")
+    sitl.hold(lambda: sitl.tilt_deg < 50.0, for_=2.0)
+    sitl.wait_until(lambda: sitl.said("Disarmed by landing"), within=20.0)
+
+
 @pytest.mark.sitl(feedback="sensors", vehicle="iris", wind="9@39", strict=False)
 def test_feet_on_the_ground_end_a_landing(sitl: Sitl) -> None:
     sitl.takeoff(2.0)
