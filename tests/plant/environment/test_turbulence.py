@@ -1,6 +1,7 @@
 """Dryden's turbulence against the formulas of MIL-F-8785C."""
 
 from collections.abc import Callable
+from functools import cache
 from math import pi
 
 import numpy as np
@@ -18,6 +19,7 @@ AIRSPEED_M_S, HEIGHT_M = 10.0, 30.0
 SCALE = scales("moderate", HEIGHT_M)
 
 
+@cache
 def blow(steps: int, step_s: float, seed: int = 1) -> Array:
     turbulence = Turbulence(seed)
     eddies = turbulence.begin()

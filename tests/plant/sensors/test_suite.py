@@ -71,6 +71,11 @@ def watch(world: World, sensors: SensorSuite, duration_s: float, interval_us: in
     return [sensors.measure(world._replace(time_us=time_us)) for time_us in times_us]
 
 
+def seldom(seed: int, duration_s: float) -> list[SensorFrame]:
+    """Watch a vehicle that stands as often as magnetometer and barometer measure."""
+    return watch(standing(), suite(seed=seed, interval_us=20_000), duration_s, 20_000)
+
+
 def fixes(frames: Sequence[SensorFrame]) -> Iterator[GpsFix]:
     return (frame.gps for frame in frames if frame.gps is not None)
 
@@ -132,10 +137,7 @@ def test_flawless_sensors_tell_the_truth() -> None:
 
 def test_the_magnetometers_iron_stays_and_its_noise_does_not() -> None:
     truth = np.array(suite(flawless()).measure(standing()).magnetic_field_flu_gauss)
-    errors = [
-        told(watch(standing(), suite(seed=seed), 4.0), Updated.MAGNETOMETER, "magnetic_field_flu_gauss") - truth
-        for seed in range(60)
-    ]
+    errors = [told(seldom(seed, 4.0), Updated.MAGNETOMETER, "magnetic_field_flu_gauss") - truth for seed in range(60)]
     magnetometer = parts().magnetometer
     assert np.mean([error.std(axis=0) for error in errors]) == pytest.approx(magnetometer.noise_gauss, rel=0.05)
     assert np.std([error.mean(axis=0) for error in errors]) == pytest.approx(magnetometer.hard_iron_gauss, rel=0.15)
@@ -143,12 +145,7 @@ def test_the_magnetometers_iron_stays_and_its_noise_does_not() -> None:
 
 def test_the_barometer_drifts_and_is_noisy() -> None:
     truth = pressure_pa(DEFAULT_ORIGIN.altitude_m)
-    errors = np.array(
-        [
-            told(watch(standing(), suite(seed=seed), 2.0), Updated.BAROMETER, "pressure_pa") - truth
-            for seed in range(200)
-        ]
-    )
+    errors = np.array([told(seldom(seed, 2.0), Updated.BAROMETER, "pressure_pa") - truth for seed in range(200)])
     barometer = parts().barometer
     assert np.diff(errors, axis=1).std() == pytest.approx(barometer.noise_pa * 2**0.5, rel=0.05)
     assert errors.mean(axis=1).std() == pytest.approx(barometer.drift_pa, rel=0.15)

@@ -41,7 +41,7 @@ def beyond(flown: LoadedTrack, margin: float) -> float:
 
 
 def test_a_turn_from_the_floor_to_the_floor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 50)
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 25)
     flown = loaded(tmp_path, TURN)
     track, waypoints = flown.track, flown.track.waypoints
     assert waypoints is not None
@@ -75,7 +75,7 @@ def test_more_margin_is_slower_and_the_same_is_the_same(tmp_path: Path, monkeypa
 @pytest.fixture(scope="module")
 def narrow_s(tmp_path_factory: pytest.TempPathFactory) -> float:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 30)
+        patch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 20)
         return loaded(tmp_path_factory.mktemp("narrow"), GATES.format("0,0,0")).track.duration_s
 
 
@@ -98,7 +98,7 @@ def test_a_wide_waypoint_is_passed_where_it_is_fastest(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 30)
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 20)
     wide = loaded(tmp_path, text, options)
     assert wide.track.waypoints is not None
     assert inside(wide.track.waypoints.points_enu_m[1] - (8.0, 3.0, 3.0))
