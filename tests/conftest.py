@@ -3,6 +3,7 @@
 import gc
 import signal
 import threading
+from importlib import import_module
 
 import pytest
 from hypothesis import settings
@@ -19,10 +20,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_finish() -> None:
-    """Keep the garbage collector from what five thousand tests load: it would look at it again and again.
-
-    Flights over UDP fork, as those of users do, although threads of pytest-xdist and jemalloc wait in this process.
-    """
+    """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
+    import_module("colibri.analysis.figures")  # with the true can_fork: two processes would copy what is collected
+    # Flights over UDP fork, as those of users do, beside the waiting threads of pytest-xdist and jemalloc.
     pytest.MonkeyPatch().setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
     gc.collect()
     freeze_once()

@@ -27,21 +27,13 @@ CAUGHT_UP_S = 4.0  # the start, 1 m below and beside the track, no longer counts
 
 
 class Flown(NamedTuple):
-    """A flight, one value a frame.
-
-    Attributes:
-        t: s, (n,).
-        tilt_deg: Of the body's z axis from the vertical, (n,).
-        error_m: Distance to the reference of the same instant, (n,).
-        z_m: Height, (n,).
-        fallback: Whether something other than a plan decided, (n,).
-    """
+    """A flight, one value a frame, (n,)."""
 
     t: Array
-    tilt_deg: Array
-    error_m: Array
+    tilt_deg: Array  # of the body's z axis from the vertical
+    error_m: Array  # distance to the reference of the same instant
     z_m: Array
-    fallback: NDArray[np.bool_]
+    fallback: NDArray[np.bool_]  # something other than a plan decided
 
 
 def starts(start: Start, count: int) -> Iterator[Start]:

@@ -11,17 +11,11 @@ Point: TypeAlias = tuple[float, float, float]
 
 
 class Airframe(NamedTuple):
-    """What a stranger knows of the vehicle.
-
-    Attributes:
-        mass_kg: Mass.
-        inertia_kg_m2: About the body's axes.
-        motors: Of each: how far forward and right it is, m, and its drag torque about down, m per N of thrust.
-    """
+    """What a stranger knows of the vehicle."""
 
     mass_kg: float
     inertia_kg_m2: Point
-    motors: tuple[Point, Point, Point, Point]
+    motors: tuple[Point, Point, Point, Point]  # m forward, m to the right, drag torque about down in m per N of thrust
 
 
 class Known(NamedTuple):

@@ -76,7 +76,7 @@ def test_hostile_files_get_one_line(command: str, tmp_path: Path, capsys: pytest
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("flown")
-    assert exit_code(["fly", "hover", "--link=memory", "--quiet", "--duration=0.5", "--out", str(folder)]) == 0
+    assert exit_code(f"fly hover --link memory --no-figures --quiet --duration 0.5 --out {folder}".split()) == 0
     return folder
 
 
