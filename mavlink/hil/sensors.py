@@ -19,7 +19,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+from colibri.mavlink.wire.ned import ned_from_enu
 
 _UNKNOWN_COVARIANCE = 255
 _INVALID, _PERFECT = 1, 100  # DISTANCE_SENSOR.signal_quality
@@ -100,9 +100,9 @@ Frame: TypeAlias = StateFrame | SensorFrame  # a frame from plant to autopilot a
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    time_us, updated, force, rate, field, pressure_pa, temperature_c, gps, distance = frame
+    time_us, updated, (fx, fy, fz), (p, q, r), (mx, my, mz), pressure_pa, temperature_c, gps, distance = frame
     pressure = (pressure_pa / 100.0, 0.0, _altitude_m(pressure_pa))
-    numbers = (time_us, *frd_from_flu(force), *frd_from_flu(rate), *frd_from_flu(field), *pressure, temperature_c)
+    numbers = (time_us, fx, -fy, -fz, p, -q, -r, mx, -my, -mz, *pressure, temperature_c)
     layout = _SHORTENED[updated > 0xFF] if updated <= 0xFFFF else _SENSOR
     messages = [layout.encode(codec, (*numbers, updated))]
     if gps is None and distance is None:
@@ -145,8 +145,7 @@ def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
 
 def _measured(numbers: Sequence[Any], gps: GpsFix | None = None, distance: Distance | None = None) -> SensorFrame:
     time_us, xacc, yacc, zacc, xgyro, ygyro, zgyro, xmag, ymag, zmag, hpa, _, _, temperature_c, updated = numbers
-    force, rate = frd_from_flu((xacc, yacc, zacc)), frd_from_flu((xgyro, ygyro, zgyro))
-    field = frd_from_flu((xmag, ymag, zmag))
+    force, rate, field = (xacc, -yacc, -zacc), (xgyro, -ygyro, -zgyro), (xmag, -ymag, -zmag)
     return SensorFrame(time_us, updated, force, rate, field, hpa * 100.0, temperature_c, gps, distance)
 
 

@@ -28,8 +28,10 @@ class InputRecord(NamedTuple):
 
 
 def encode_input(time_us: int, kind: RecordKind, content: bytes) -> bytes:
+    if len(content) <= CHUNK_BYTES:
+        return _MESSAGE.pack(CONTENT_BYTES, DATA, INPUT_NUMBER, time_us, kind, False, len(content), content)
     encoded = b""
-    for begin in range(0, max(len(content), 1), CHUNK_BYTES):
+    for begin in range(0, len(content), CHUNK_BYTES):
         chunk = content[begin : begin + CHUNK_BYTES]
         goes_on = begin + CHUNK_BYTES < len(content)
         encoded += _MESSAGE.pack(CONTENT_BYTES, DATA, INPUT_NUMBER, time_us, kind, goes_on, len(chunk), chunk)

@@ -4,8 +4,8 @@ from collections import deque
 from dataclasses import replace
 from math import hypot
 
+from colibri.common.compiled_rotations import earth_from_body
 from colibri.common.earth.compiled_geodesy import geodetic_of
-from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import GpsFix
 from colibri.plant.environment.random_streams import Chance

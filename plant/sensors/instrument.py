@@ -99,7 +99,7 @@ class Triad:
             self._draw()
         bx, by, bz, dx, dy, dz = self._drawn.pop()
         x, y, z = bx + (truth[0] + dx), by + (truth[1] + dy), bz + (truth[2] + dz)
-        if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
+        if abs(x) <= limit and abs(y) <= limit and abs(z) <= limit:
             return (x, y, z)
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
 

@@ -1,7 +1,7 @@
 """The plant's magnetometer: Earth's field in body axes, hard iron, noise."""
 
+from colibri.common.compiled_rotations import earth_from_body
 from colibri.common.earth.magnetic_field import field_enu_gauss
-from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of

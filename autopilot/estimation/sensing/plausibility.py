@@ -25,8 +25,9 @@ class Watch:
         self.is_new = False
 
     def accepts(self, values: tuple[float, ...], time_us: int, rejected: Rejected) -> bool:
+        least, most = self._minimum, self._maximum
         for value in values:
-            if not self._minimum <= value <= self._maximum:
+            if not least <= value <= most:
                 rejected.add(self._source, _reason(values))
                 return False
         self.is_new = values != self._last
