@@ -74,7 +74,7 @@ def test_what_no_rotor_can_follow_is_refused(speeds: list[float]) -> None:
     ],
 )
 def test_the_geometric_controller_tracks_an_ideal_vehicle(tmp_path: Path, track: str, rms_m: float) -> None:
-    figures = fly(tmp_path, track, "--profile", "se3", "--link", "memory", "--duration", "30")
+    figures = fly(tmp_path, track, "--profile", "se3", "--link", "memory", "--duration", "23")
     assert figures["rmse_after_20s_m"] < rms_m
     assert figures["solver"] is None
 
