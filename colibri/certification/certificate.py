@@ -31,8 +31,10 @@ def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False
     if (multipliers <= 0).any() or (_fractions(proof.sizes) <= 0).any() or not _mirrored(loop, P, multipliers, forms):
         return 0.0
     ratio, stage = exactly(proof.ratio), loop.stage if weighted else 0
-    matrices = (decrease(loop, A, P, multipliers, forms, ratio, stage) for A in loop.distinct().vertices)
-    return min([positive_margin(P), *map(positive_margin, matrices)])
+    margin = positive_margin(P)
+    for A in loop.distinct().vertices:
+        margin = margin and min(margin, positive_margin(decrease(loop, A, P, multipliers, forms, ratio, stage)))
+    return margin
 
 
 def limit_margin(loop: UncertainLoop, proof: Proof) -> float:

@@ -19,7 +19,6 @@ _LATENCIES = round(MAX_LATENCY_S / _GRID_S)
 _NEAR = 6  # latencies refined on either side of the table's best
 _TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 36)
 _ACCELERATION_LAGS_S = np.geomspace(0.008, 0.15, 10)
-_FIRST_ORDER = np.zeros(1)
 _LEAST_LAG_S = 0.004  # a shorter lag of the acceleration counts as zero
 _CLEARLY_LESS = 0.9  # largest ratio of unexplained variances that justifies the second order
 _LEAST_SAMPLES = 200
@@ -58,7 +57,7 @@ def fit(log: RateLog) -> Fit:
     grid = np.arange(max(log.command_s[0], log.measured_s[0]), log.measured_s[-1], _GRID_S)
     commands = log.commands[np.maximum(np.searchsorted(log.command_s, grid, side="right") - 1, 0)]
     measured = np.stack([np.interp(grid, log.measured_s, log.rates[:, axis]) for axis in range(3)], axis=1)
-    found = _found(commands, measured, _FIRST_ORDER)
+    found = _found(commands, measured, np.zeros(1))
     second = _found(commands, measured, _ACCELERATION_LAGS_S)
     if second.unexplained.sum() < _CLEARLY_LESS * found.unexplained.sum():
         found = second
