@@ -81,7 +81,7 @@ class Numbers:
         self._model = vehicle_numbers(self._tree)
         name, keys = profile.controller, f"controllers.{profile.controller}"
         self.definitions = [
-            number.parameter(_default(number, tree), group, details.format(described(number.path)))
+            number.parameter(_default(number, tree), group, details.replace("{}", described(number.path)))
             for numbers, tree, group, details in (
                 (self._law, self._table, f"Control law {name}", f"Profile key {keys}.{{}}."),
                 (self._model, self._tree, "Vehicle model", "Vehicle key {}, autopilot only."),
