@@ -18,17 +18,18 @@ _BRIDGED_US = 20_000  # validity of the last good value when values are missing
 _FROZEN_US = 12_000  # the same when it is repeated, though it has noise: a frozen turn would be flown against
 _NOISY_1_S = 10.0  # bandwidth at which the model follows a noisy gyroscope
 _MAX_STEP_S = 0.02
-_FAILED_US = 100_000  # a sensor without values for so long has failed: those that come later may be late
+# A sensor without values for so long, and in so many frames, has failed: those that come later may be as late.
+_FAILED_M_S2_US, _FAILED_RAD_S_US, _FAILED_FRAMES = 45_000, 15_000, 4
 
 
 class InertialSensor:
     """One of the two sensors; one that has `failed`, or is `noisy` beside, stays so until it is trusted again."""
 
-    def __init__(self, source: RejectedSource, group: int, maximum: float, noise: float) -> None:
-        self._group = group
+    def __init__(self, source: RejectedSource, group: int, maximum: float, noise: float, failed_us: int) -> None:
+        self._group, self._failed_us = group, failed_us
         maximum *= _BEYOND_RANGE
         self._watch = Watch(source, -maximum, maximum, _FROZEN_US if noise > 0.0 else inf)
-        self._repeats = noise == 0.0
+        self._repeats, self._without = noise == 0.0, 0  # values, and number of frames in a row
         self.time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
         self.failed = self.noisy = False
@@ -36,12 +37,13 @@ class InertialSensor:
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
         accepted = frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected)
         if accepted and (self._watch.is_new or self._repeats):
-            self.value, self.time_us = value, frame.time_us
+            self.value, self.time_us, self._without = value, frame.time_us, 0
             return not self.failed
         if self.time_us is None:
             return False
+        self._without += 1
         late_us = frame.time_us - self.time_us
-        self.failed = self.failed or late_us > _FAILED_US
+        self.failed |= late_us > self._failed_us and self._without >= _FAILED_FRAMES
         return late_us <= (_FROZEN_US if accepted else _BRIDGED_US) and not self.failed
 
 
@@ -65,10 +67,12 @@ class Inertial:
         self.expected: Expected | None = None
         self._turns: tuple[int, Vector] | None = None
         self.accelerometer = InertialSensor(
-            RejectedSource.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2, accel.noise_density_m_s2_rthz
+            *(RejectedSource.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2),
+            *(accel.noise_density_m_s2_rthz, _FAILED_M_S2_US),
         )
         self.gyroscope = InertialSensor(
-            RejectedSource.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz
+            *(RejectedSource.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s),
+            *(gyro.noise_density_rad_s_rthz, _FAILED_RAD_S_US),
         )
 
     def read(self, frame: SensorFrame) -> InertialReading:

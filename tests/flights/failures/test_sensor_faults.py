@@ -116,14 +116,15 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
     assert sitl.tilt_deg < 5.0
 
 
+@pytest.mark.parametrize(("kind", "late_s"), [("stuck", 0.0), ("delayed", 0.03)])
 @pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
-def test_a_gyroscope_that_freezes_in_a_turn_is_not_flown_against(sitl: Sitl) -> None:
+def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(sitl: Sitl, kind: str, late_s: float) -> None:
     sitl.takeoff(5.0)
     sitl.goto(40.0, 0.0, 5.0, wait=False)
     sitl.run(3.0)
     sitl.goto(-40.0, 0.0, 5.0, wait=False)
     sitl.run(0.15)
-    sitl.inject("gyro", "stuck")
+    sitl.inject("gyro", kind, 0, late_s)
     sitl.hold(lambda: sitl.tilt_deg < 50.0, for_=2.0)
     sitl.wait_until(lambda: sitl.said("Disarmed by landing"), within=20.0)
 
