@@ -13,6 +13,7 @@ from colibri.common.process.lifecycle import freeze_once, use_one_thread
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
 
+gc.set_threshold(20_000, 20, 20)
 use_one_thread()  # before numpy is loaded: two workers have a core each
 
 # A shell's background job ignores Ctrl-C, and so would every process that a test starts.
@@ -26,4 +27,3 @@ def pytest_collection_finish() -> None:
     pytest.MonkeyPatch().setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
     gc.collect()
     freeze_once()
-    gc.set_threshold(20_000, 20, 20)
