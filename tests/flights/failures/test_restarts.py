@@ -65,7 +65,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened(sitl_fleet: Callable[..., 
 
 
 @pytest.mark.parametrize("missed", [30, pytest.param(1, marks=pytest.mark.long)])
-@pytest.mark.parametrize("feedback", ["state", "sensors"])
+@pytest.mark.parametrize("feedback", [pytest.param("state", marks=pytest.mark.long), "sensors"])
 def test_a_restart_is_not_felt_in_hover_and_in_a_turn(
     sitl_fleet: Callable[..., list[Sitl]], feedback: str, missed: int
 ) -> None:

@@ -145,7 +145,9 @@ def test_slow_drifts_and_winds_end_in_landings(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "drift"), [("mag", (0.03, 0.0, 0.0)), ("gyro", (0.003, 0.0, 0.0))], ids=["magnetometer", "gyroscope"]
+    ("unit", "drift"),
+    [("mag", (0.03, 0.0, 0.0)), pytest.param("gyro", (0.003, 0.0, 0.0), marks=pytest.mark.long)],
+    ids=["magnetometer", "gyroscope"],
 )
 @pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="7@200", strict=False)
 def test_a_sensor_that_drifts_slowly_turns_nothing(sitl: Sitl, unit: str, drift: Vector) -> None:
