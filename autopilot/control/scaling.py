@@ -25,7 +25,7 @@ from colibri.plant.vehicle.description import Vehicle
 _LEAST_THRUST = 1.05
 _PAYLOAD = 1.1
 _LEAST_CLIMB = 0.25
-_ACROSS = 0.75
+_ACROSS = 0.8
 
 
 class LpvMpcScaling(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -136,7 +136,7 @@ def _acceleration(vehicle: Capability, ratios: LpvMpcScaling) -> float:
 
 
 def _approach_speed(vehicle: Capability, ratios: LpvMpcScaling) -> float:
-    return sqrt(2.0 * ratios.braking_m * _acceleration(vehicle, ratios))
+    return sqrt(2.0 * ratios.braking_m * _climb(vehicle, ratios))
 
 
 def _max_rate(vehicle: Capability, ratios: LpvMpcScaling) -> list[float]:
@@ -148,9 +148,9 @@ _LPV_MPC = {
     "guidance.poles": ScalingRule("poles / √slow", _slowed("poles", -0.5)),
     "guidance.max_climb_m_s2": ScalingRule("acceleration × climb, at most max_g × g / √slow", _climb),
     "guidance.max_acceleration_m_s2": ScalingRule(
-        "at least max_climb_m_s2 and ¾ across, at most max_g × g / √slow", _acceleration
+        "at least max_climb_m_s2 and 0.8 across, at most max_g × g / √slow", _acceleration
     ),
-    "guidance.approach_speed_m_s": ScalingRule("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
+    "guidance.approach_speed_m_s": ScalingRule("√(2 braking_m × max_climb_m_s2)", _approach_speed),
     "observer.acceleration_rad_s": ScalingRule("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
     "observer.moment_rad_s": ScalingRule("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),
     "observer.max_acceleration_m_s2": ScalingRule(

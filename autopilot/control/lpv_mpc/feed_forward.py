@@ -24,6 +24,7 @@ HEADING_ABOVE = 0.15  # least vertical part of body z at which the yaw has a mea
 _TWIST_RAD_S = 4.0  # of the return to it
 _STRONG_WIND = 0.2  # horizontal force, in parts of the weight, beyond which errors of velocity count as distances
 _STOP_S, _MAX_STOP_S, _IN_GUSTS_M_S = 10.0, 2.0, 0.3  # for each part beyond; at most; error that does not count
+_CLOSING = 0.125  # least speed of an approach, in parts of the reference's
 _CATCH_UP_S = 1.0  # in which an error of velocity is made good, within the accelerations
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
@@ -327,7 +328,7 @@ def approach(
     speed. An impossible motion that is far away counts in part: it must not lead the vehicle astray.
     """
     law = packed[0]
-    away, squared, late = np.empty(3), 0.0, 0.0
+    away, squared, late, speed = np.empty(3), 0.0, 0.0, norm(references[1][0])
     for i in range(3):
         away[i] = references[0][0, i] - position[i]
         squared += away[i] * away[i]
@@ -342,11 +343,12 @@ def approach(
         return
     part = max(law.follow_within_m / max(distance, law.follow_within_m), feasible)
     smooth = 1.0 - law.exact_within_m / reach
-    is_far, h = distance > law.max_error_m, law.interval_s
+    far_m, h = max(law.max_error_m, _CLOSING * part * speed * law.k2_s / law.k1_s2), law.interval_s
+    is_far = distance > far_m
     error, error_rate, drift = np.zeros(3), np.empty(3), np.zeros(3)
     for i in range(3):
         if is_far:
-            drift[i] = law.k1_s2 / law.k2_s * law.max_error_m / distance * away[i]
+            drift[i] = law.k1_s2 / law.k2_s * far_m / distance * away[i]
         else:
             error[i] = away[i]
         error_rate[i] = part * references[1][0, i] + drift[i] - velocity[i]
