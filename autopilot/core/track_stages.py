@@ -25,7 +25,6 @@ from colibri.plant.vehicle.description import Vehicle
 if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
 
-_CATCHING_UP = Pace.CATCHING_UP
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
@@ -105,7 +104,7 @@ class TrackStages:
         references = self._planner.horizon_at(acts_us - loop.lag_us, loop.control_interval_us)
         sinks = is_below(references.position_enu_m.item(2), state)
         self._landing, _ = watch(self._landing, now_us, state, sinks)
-        return Guidance(references, pace=_CATCHING_UP)
+        return Guidance(references, pace=Pace.CATCHING_UP)
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         assert guidance.horizon is not None, "a track has references at any time"

@@ -1,4 +1,4 @@
-"""All MAVLink services of a vehicle on one hub."""
+"""MAVLink services of a vehicle, on one hub."""
 
 from collections import deque
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""All parameters of the autopilot: control law, vehicle model, behaviour, failsafes."""
+"""Parameters of the autopilot: control law, vehicle model, behaviour, failsafes."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -25,7 +25,7 @@ def exactly(value: float) -> Fraction:
 
 
 def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False) -> float:
-    """Return the least margin over all vertices; 0 without proof."""
+    """Return the least margin over the vertices; 0 without proof."""
     P, multipliers = _fractions(proof.P), _fractions(proof.multipliers)
     forms = supply(loop, _fractions(proof.sizes)).forms
     if (multipliers <= 0).any() or (_fractions(proof.sizes) <= 0).any() or not _mirrored(loop, P, multipliers, forms):
@@ -112,7 +112,7 @@ class Certificate(NamedTuple):
 
     largest: ProofEntry
     decay: ProofEntry
-    invariant: ProofEntry  # the largest set that the disturbed loop never leaves, within all limits
+    invariant: ProofEntry  # the largest set that the disturbed loop never leaves, within the limits
     attractor: ProofEntry  # the smallest set that every trajectory tends to
     terminal: ProofEntry  # a terminal weight that keeps plans feasible and decreases their cost
 

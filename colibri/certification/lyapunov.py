@@ -207,7 +207,7 @@ def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) ->
 
 
 def invariant_set(loop: UncertainLoop) -> Proof | None:
-    """Find the largest set V <= 1 that is never left, within all limits."""
+    """Find the largest set V <= 1 that is never left, within the limits."""
     return _first(loop, _SET_RATIOS, _set_program)
 
 

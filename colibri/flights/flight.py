@@ -99,7 +99,7 @@ def direct_flight(
 
 
 class InMemory:
-    """Carries the datagrams of two processes in memory; `traffic` records all frames.
+    """Carries the datagrams of two processes in memory; `traffic` records frames.
 
     A frame alone is only rounded as its datagram would round it, unless it is recorded, or of sensors and `replayed`.
     """

@@ -125,7 +125,7 @@ ROWS: tuple[FaultRow, ...] = (
     ),
 )
 TABLE: Mapping[tuple[int, int], FaultRow] = {(row.unit, row.kind): row for row in ROWS}
-"""All faults that a plant may support."""
+"""Faults that a plant may support."""
 
 
 def unit_name(unit: int) -> str:
@@ -167,7 +167,7 @@ def fault_from(p1: float, p2: float, p3: float, values: FaultValues) -> Fault | 
 
 
 def judged(fault: Fault, parts: Collection[Equipment], motors: int = MOTORS) -> Fault | Refusal:
-    """Return a fault with all its numbers, or its refusal by a plant with these `parts`."""
+    """Return a fault with its numbers complete, or its refusal by a plant with these `parts`."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
         return Refusal("no plant does this fault", RESULT_UNSUPPORTED)

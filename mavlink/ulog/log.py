@@ -23,7 +23,7 @@ RowEncoder: TypeAlias = Topic | Blocks  # encoder of a topic's rows, or of sever
 
 
 def beginning(vehicle: str, parameters: Mapping[str, int | float]) -> bytes:
-    """Return a file's formats of all topics, facts, parameters and subscriptions."""
+    """Return a file's formats of topics, facts, parameters and subscriptions."""
     own = {topic.name: topic.fields for topic in FLIGHT_TOPICS} | {INPUT: INPUT_FIELDS}
     numbers = NUMBERS | {topic.name: topic.number for topic in FLIGHT_TOPICS} | {INPUT: INPUT_NUMBER}
     formats = [messages.format_of(name, fields) for name, fields in {**PARTS, **TOPICS, **own}.items()]

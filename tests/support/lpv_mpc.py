@@ -1,6 +1,6 @@
 """The whole-vehicle law over the plant, and its model over a horizon."""
 
-from math import radians
+from math import pi, radians, tan
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from colibri.autopilot.control.lpv_mpc import model
 from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc
 from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import model_of
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
@@ -23,7 +24,20 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 VEHICLE, ROTORS = load_vehicle("hummingbird"), 4
 TABLE = load_profile("flight").table("lpv-mpc")
-STEP_US = 8_000
+STEP_US, INTERVAL_S = 8_000, 0.008
+MODEL = model_of(VEHICLE, INTERVAL_S)
+PACKED = packed(MODEL)
+LAP_STEPS = 40
+WIDE = ForceLimits(True, tan(1.2), 0.2, 19.0, 0.2)
+CALM = Disturbance(np.zeros(3), np.zeros(3))
+
+
+def circle(radius_m: float, period_s: float) -> tuple[np.ndarray, ...]:
+    """Position, velocity, acceleration and yaw on a level circle, looking outwards."""
+    angle = 2.0 * pi / period_s * INTERVAL_S * np.arange(LAP_STEPS + 2)
+    w, out = 2.0 * pi / period_s, np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    along = np.stack([-np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
+    return radius_m * out, radius_m * w * along, -radius_m * w * w * out, angle
 
 
 def law(vehicle: Vehicle = VEHICLE) -> LpvMpc:
@@ -71,10 +85,8 @@ class Flight:
 
 HOVERING = Start(x=0.0, y=0.0, z=20.0, psi=0.0, rotors=4740.0)
 HUMMINGBIRD = load_vehicle("hummingbird").without(["battery", "ground"])
-INTERVAL_S = 0.008
 STARTS = np.array([0, 1, 3, 8])
 STEPS = 8
-CALM = Disturbance(np.zeros(3), np.zeros(3))
 
 
 def start(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

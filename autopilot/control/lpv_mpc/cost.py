@@ -38,7 +38,7 @@ class CostWeights(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """Constants of all QPs of one kind."""
+    """Constants of the QPs of one kind."""
 
     starts: Integers  # step of each block, and N, (b + 1,)
     counted: Integers  # steps with errors in the cost, (c,)
@@ -117,7 +117,7 @@ def _add_motion(
 ) -> None:
     """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n.
 
-    One loop over all rows: loading an element of H takes as long as adding one row.
+    One loop over the rows: loading an element of H takes as long as adding one row.
     """
     weights = problem.weights
     on_place, on_velocity, on_rate, on_heading = weights.position, weights.velocity, weights.rate, weights.heading

@@ -22,8 +22,8 @@ from colibri.autopilot.control.interface import (
     still_horizon,
 )
 from colibri.autopilot.control.lpv_mpc import compromise, planning
+from colibri.autopilot.control.lpv_mpc.approach import Approach
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation
-from colibri.autopilot.control.lpv_mpc.feed_forward import Approach
 from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
@@ -67,7 +67,7 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     follow_within_m: Positive = 0.54
     max_acceleration_m_s2: Positive
     max_climb_m_s2: Positive | None = None
-    """Its upward part; None: no less."""
+    """Largest upward acceleration of an approach; None: `max_acceleration_m_s2`."""
     exact_within_m: Positive = 0.3
     max_tilt_deg: Degrees
     min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]

@@ -1,7 +1,7 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
 from math import inf, nan, radians
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
@@ -65,11 +65,14 @@ class Plan(NamedTuple):
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
-Corrections: TypeAlias = tuple[QpStatus, Array | None, float, float, tuple[int, int]]
-"""Status of the last QP; changes of the corrections, (n,); iterations, 0 without a solver; largest violation of a soft
-limit, in parts of it; active soft limits of tilt and of rates.
-"""
-_SOLVED, _NO_LIMITS, _INACTIVE = QpStatus.SOLVED, (0, 0), Active()
+class Corrections(NamedTuple):
+    """Result of the QPs of a plan."""
+
+    status: QpStatus  # of the last QP
+    z: Array | None  # changes of the corrections, (n,)
+    iterations: float  # 0 without a solver
+    slack: float = 0.0  # largest violation of a soft limit, in parts of it
+    binding: tuple[int, int] = (0, 0)  # active soft limits of tilt and of rates
 
 
 class _Qps(NamedTuple):
@@ -201,7 +204,7 @@ class Mpc:
         commands = np.empty((self.horizon, rotors))
         states = np.empty((self.horizon + 1, planning.PREDICTED + rotors))
         binding = planning.read(qps.kind, z, psi, commands, states)
-        active = Active(binding, 0, *soft) if binding or soft is not _NO_LIMITS else _INACTIVE
+        active = Active(binding, 0, *soft)
         diagnostics = Diagnostics(
             status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )
@@ -222,17 +225,17 @@ class Mpc:
         """
         is_free, is_beyond = planning.minimise(kind, minimum)
         if is_free and not is_beyond:
-            return _SOLVED, minimum, 0, 0.0, _NO_LIMITS
-        status, z, iterations = QpResult(_SOLVED, minimum, 0) if is_free else self._solver.solve(free)
+            return Corrections(QpStatus.SOLVED, minimum, 0)
+        status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
         if z is None or not (is_beyond or planning.is_beyond(kind, z)):
-            return status, z, iterations, 0.0, _NO_LIMITS
+            return Corrections(status, z, iterations)
         planning.limit(kind)
         status, z, more = self._solver.solve(limited)
         iterations += more
         if z is None:
-            return status, z, iterations, 0.0, _NO_LIMITS
+            return Corrections(status, z, iterations)
         slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
-        return status, z[: len(free.f)].copy(), iterations, slack, soft
+        return Corrections(status, z[: len(free.f)].copy(), iterations, slack, soft)
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

@@ -194,7 +194,7 @@ def minimise(kind: Packed, z: Array) -> tuple[bool, bool]:
 
 @compiled
 def free_minimum(qp: Qp, blocks: int, rotors: int, z: Array) -> bool:
-    """Write the unconstrained minimum by Cholesky factors; return whether it is within all bounds.
+    """Write the unconstrained minimum by Cholesky factors; return whether it is within bounds.
 
     Speeds along the path stay at their upper bounds, optimal while the vehicle is on time.
     """

@@ -6,9 +6,10 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import feed_forward
+from colibri.autopilot.control.lpv_mpc.approach import Approach, approach, feasible_part, stopping_s
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation, compromise, stay_within
 from colibri.autopilot.control.lpv_mpc.cost import PlanReferences
-from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
+from colibri.autopilot.control.lpv_mpc.feed_forward import Flat
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
 from colibri.autopilot.control.lpv_mpc.planning import Now
@@ -76,13 +77,13 @@ class TargetBuilder:
             feed_forward.go_on_turning(now.rigid, h, nominal[3])
             steady[3][:], ending[3][:] = nominal[3], nominal[3][-3:]
         near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
-        feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
-        stop_s = feed_forward.stopping_s(now.disturbance, mpc.model)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self._law, near)
+        feasible = feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
+        stop_s = stopping_s(now.disturbance, mpc.model)
+        approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self._law, near)
         feed_forward.ask(
             now.rigid, near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat
         )
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, stop_s, self._law, near)
+        approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, stop_s, self._law, near)
         feed_forward.ask(now.rigid, *ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
         target.yaw_rad[:], target.end_squared[:] = nominal[3], last_flat.squared[1]

@@ -29,21 +29,22 @@ class InertialSensor:
         self._group, self._failed_us = group, failed_us
         maximum *= _BEYOND_RANGE
         self._watch = Watch(source, -maximum, maximum, _FROZEN_US if noise > 0.0 else inf)
-        self._repeats, self._without = noise == 0.0, 0  # values, and number of frames in a row
+        self._may_repeat = noise == 0.0
+        self._frames_without = 0  # a new value, in a row
         self.time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
         self.failed = self.noisy = False
 
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
         accepted = frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected)
-        if accepted and (self._watch.is_new or self._repeats):
-            self.value, self.time_us, self._without = value, frame.time_us, 0
+        if accepted and (self._watch.is_new or self._may_repeat):
+            self.value, self.time_us, self._frames_without = value, frame.time_us, 0
             return not self.failed
         if self.time_us is None:
             return False
-        self._without += 1
+        self._frames_without += 1
         late_us = frame.time_us - self.time_us
-        self.failed |= late_us > self._failed_us and self._without >= _FAILED_FRAMES
+        self.failed |= late_us > self._failed_us and self._frames_without >= _FAILED_FRAMES
         return late_us <= (_FROZEN_US if accepted else _BRIDGED_US) and not self.failed
 
 
