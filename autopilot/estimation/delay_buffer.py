@@ -44,9 +44,19 @@ class DelayBuffer:
         return self.waiting.popleft()
 
     def mean_rate(self) -> Vector:
-        rows = np.arange(self.first, self.first + len(self.waiting)) % len(self.samples)
-        p, q, r = np.mean(self.samples[rows, RATE : RATE + 3], axis=0).tolist()
+        p, q, r = np.mean(self.samples[self._rows(len(self.waiting)), RATE : RATE + 3], axis=0).tolist()
         return p, q, r
+
+    def add_bias(self, bias: Vector, since: int) -> float:
+        """Add to the rates before the last `since` samples, which have it; return the time with it taken before, s."""
+        rows = self._rows(len(self.waiting) - since)
+        self.samples[rows, RATE : RATE + 3] += bias
+        self.samples[rows[-1:], RATE : RATE + 3] -= 0.5 * np.array(bias)  # the jump was in this sample
+        taken = max(since - len(self.waiting), 0)
+        return taken * float(self.samples[self.first, 0])
+
+    def _rows(self, count: int) -> Array:
+        return np.arange(self.first, self.first + count) % len(self.samples)
 
 
 @compiled

@@ -51,6 +51,7 @@ _SETTLING_US = 10_000_000  # after a start in the air
 _UNSURE_PART = 0.3  # uncertainty of the position correction after a bias, as a part of it
 _UNSURE_TIMES = 3.0  # inflation of the bias variance, because the velocity correction has the same error
 _UNSURE_TURN = 2.0  # the attitude error may exceed the turn of the field, which does not show a turn about itself
+_JUMPED_PART = 0.05  # uncertainty of a jump of the gyroscope bias, as a part of it
 _UNSURE_S = 0.5  # mean duration of the velocity error
 _MODELLED_M_S2, _MODELLED_RAD_S = 2.0, 0.2  # errors of a modelled force, by drag and mass, and of the rate at first
 _MISTURNED_RAD = 0.05  # error of the attitude by a gyroscope up to the detection of its failure
@@ -262,6 +263,14 @@ class Filter:
         update.inflate_covariance(P, VELOCITY, 3, speed_m_s * speed_m_s)
         self.velocity.reset(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
+        self.gyro_bias_us = time_us
+
+    def jump_gyro_bias(self, bias: Vector, misturned_s: float, time_us: int) -> None:
+        """Change the bias, which has turned the attitude for a time."""
+        self.x[10:13] += bias
+        size = hypot(*bias)
+        update.inflate_covariance(self.P, GYRO_BIAS, 3, square(_JUMPED_PART * size))
+        update.inflate_covariance(self.P, ATTITUDE, 3, square(size * misturned_s))
         self.gyro_bias_us = time_us
 
     def _doubt_attitude(self) -> None:

@@ -13,6 +13,7 @@ from colibri.autopilot.estimation.sensing.inertial import Inertial
 
 _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
 _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
+_WILD_TIMES = 4.0  # the noise of rates that would tip the vehicle over in this time
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
 _MEAN_PART, _HIGH_SIGMAS = 0.2, 2.5  # filter gain of the mean innovation of pressures, and what contradicts
@@ -33,10 +34,13 @@ class InertialWatch:
     def look(self, buffer: DelayBuffer, filter_: Filter, now_us: int, *, rate_known: bool) -> None:
         """Check the waiting samples, and the tests of the filter; `rate_known`: the gyroscope is usable."""
         inertial, rough = self._inertial, self._rough
-        parts = roughness(buffer.samples, buffer.first, len(buffer.waiting), _ROUGH_M_S2, _ROUGH_RAD_S)
-        learn_drag(buffer.samples, buffer.first, len(buffer.waiting), filter_.x, filter_.drag)
+        waiting = buffer.samples, buffer.first, len(buffer.waiting)
+        parts = roughness(*waiting, _ROUGH_M_S2, _ROUGH_RAD_S)
+        learn_drag(*waiting, filter_.x, filter_.drag)
         for sensor, part in enumerate(parts):
             rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
+        if rough[1] and roughness(*waiting, _ROUGH_M_S2, _WILD_TIMES * _ROUGH_RAD_S)[1] > _ROUGH_PART:
+            rough[1] = _ROUGH_CHECKS
         inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS
         if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
             inertial.gyroscope.failed = inertial.gyroscope.noisy = True

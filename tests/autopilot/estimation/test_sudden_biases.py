@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.common.earth.geodesy import geodetic_of
@@ -156,6 +158,40 @@ def test_a_sudden_gyroscope_bias_is_found_in_time(path: source.Path, bias: Vecto
     after = [one for one in known(of) if one.frame.time_us > learning[0].frame.time_us + 1_000_000]
     assert not any(one.health.gps_glitch for one in after)
     assert all(one.health.attitude for one in after)
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("bias", [(0.8, 0.0, 0.0), (-2.0, 5.0, 0.5)])
+def test_a_large_gyroscope_bias_is_found_before_the_vehicle_tilts(path: source.Path, bias: Vector) -> None:
+    flight = recorded(path, 3, 17.0)
+    of = estimates(flight.frames, turned(bias))
+    found, biased = next(one for one in known(of) if not one.health.gyro_bias), flight.gyro_bias[-1] + bias
+    assert found.frame.time_us * 1e-6 - BEGAN_S < 0.12
+    assert np.allclose(found.gyro_bias_rad_s, biased, atol=0.05 * hypot(*bias))
+    assert np.allclose(known(of)[-1].gyro_bias_rad_s, biased, atol=0.02)
+    assert all(one.health.attitude for one in known(of))
+    assert error_m(flight, of, 16.9) < 0.5
+
+
+@pytest.mark.parametrize("turn", [(0.9, 0.0, 0.0), (-2.0, 5.0, 0.5)])
+def test_a_vehicle_that_is_turned_by_a_knock_has_no_gyroscope_bias(turn: Vector) -> None:
+    """It turns for 0.1 s from one sample to the next, and back."""
+
+    def knocked(frame: SensorFrame, t: float) -> SensorFrame:
+        turned_s = min(t, 0.2 - t)
+        if turned_s < 0.0:
+            return frame
+        to_body = Rotation.from_rotvec(np.array(turn) * turned_s).inv()
+        return frame._replace(
+            rate_flu_rad_s=plus(frame.rate_flu_rad_s, turn, 1.0 if t < 0.1 else -1.0),
+            specific_force_flu_m_s2=tuple(to_body.apply(frame.specific_force_flu_m_s2).tolist()),
+            magnetic_field_flu_gauss=tuple(to_body.apply(frame.magnetic_field_flu_gauss).tolist()),
+        )
+
+    flight = recorded(source.hover, 7, 18.0)
+    of = known(estimates(flight.frames, fails(knocked)))
+    assert all(one.health.gyro_bias and one.health.attitude for one in of)
+    assert np.allclose(of[-1].gyro_bias_rad_s, flight.gyro_bias[-1], atol=0.002)
 
 
 def test_a_gyroscope_drift_is_followed() -> None:

@@ -129,6 +129,14 @@ def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(sitl: Sitl, kind:
     sitl.wait_until(lambda: sitl.said("Disarmed by landing"), within=20.0)
 
 
+@pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
+def test_with_a_large_gyroscope_bias_it_flies_on(sitl: Sitl) -> None:
+    sitl.takeoff(2.0)
+    sitl.inject("gyro", "wrong", 0, 2.0, -1.0, 0.0)
+    sitl.hold(lambda: sitl.tilt_deg < 40.0, for_=2.0)
+    assert sitl.mode is Mode.HOLD
+
+
 @pytest.mark.sitl(feedback="sensors", vehicle="iris", wind="9@39", strict=False)
 def test_feet_on_the_ground_end_a_landing(sitl: Sitl) -> None:
     sitl.takeoff(2.0)

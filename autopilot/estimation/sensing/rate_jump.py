@@ -1,0 +1,99 @@
+"""A rate that jumps within one sample and stays: a bias of the gyroscope, or a turn by a knock.
+
+The magnetic field decides: from the last field before the jump, the rates with and without it predict two fields.
+A jump about the field itself turns no field; it stays undecided, for the filter to find.
+"""
+
+from math import dist
+
+from colibri.common.types import Vector
+from colibri.plant.vehicle.sensors import Sensors
+
+_LEAST_RAD_S = 0.5  # of a jump, summed over the axes; the filter finds smaller biases in time
+_CALM_PART = 0.25  # of the jump, in the changes before and after it
+_FITS_PART, _FITS_SIGMAS = 0.02, 5.0  # of the field and of its noise: a prediction with a smaller error fits
+_CONTRADICTED = 2.0  # times that: the least error of the other prediction
+_WITHIN_S = 0.4
+
+
+class RateJump:
+    """Watches the rates of one vehicle; `samples` have been taken since the jump."""
+
+    def __init__(self, sensors: Sensors, field_gauss: float) -> None:
+        self._fits_gauss = max(_FITS_PART * field_gauss, _FITS_SIGMAS * sensors.magnetometer.noise_gauss)
+        self._field: Vector | None = None  # the last one
+        self._field_s = 0.0  # its age
+        self._change: Vector = (0.0, 0.0, 0.0)  # of the last sample
+        self._jump: Vector | None = None  # that is examined
+        self._with = self._without = self._change  # the jump, fields now
+        self._within_s = 0.0
+        self.samples = 0
+
+    def forget(self) -> None:
+        self._jump = self._field = None
+
+    def look(self, before: Vector, rate: Vector, interval_s: float, field: Vector | None) -> Vector | None:
+        """Take the rates at both ends of a sample and the field at its end, FLU; return a jump that is a bias."""
+        (a, b, c), (p, q, r) = before, rate
+        last, change = self._change, (p - a, q - b, r - c)
+        size, bias = _size(change), None
+        self._change = change
+        self._field_s += interval_s
+        if size > _LEAST_RAD_S and _size(last) < _CALM_PART * size:
+            self._jump, self.samples = _less(change, last), 0
+        elif self._jump is not None:
+            self.samples += 1
+            if self.samples > 1:
+                bias = self._follow(self._jump, rate, interval_s, field)
+            elif self._field is None or size > _CALM_PART * _size(self._jump):
+                self._jump = None
+            else:
+                self._begin(self._field, self._jump, rate, interval_s)
+        if field is not None:
+            self._field, self._field_s = field, 0.0
+        return bias
+
+    def _begin(self, field: Vector, jump: Vector, rate: Vector, interval_s: float) -> None:
+        """Predict the field after one sample with the jump, and the half of one in which it began."""
+        after_s = min(1.5 * interval_s, self._field_s)
+        field = _turned(field, _less(rate, jump), self._field_s - after_s)
+        self._with, self._without = _turned(field, rate, after_s), _turned(field, _less(rate, jump), after_s)
+        self._within_s = _WITHIN_S
+
+    def _follow(self, jump: Vector, rate: Vector, interval_s: float, field: Vector | None) -> Vector | None:
+        self._with = _turned(self._with, rate, interval_s)
+        self._without = _turned(self._without, _less(rate, jump), interval_s)
+        self._within_s -= interval_s
+        if self._within_s < 0.0:
+            self._jump = None
+        if field is None:
+            return None
+        turned_gauss, biased_gauss = dist(field, self._with), dist(field, self._without)
+        contradicted_gauss = _CONTRADICTED * self._fits_gauss
+        if turned_gauss < self._fits_gauss and biased_gauss > contradicted_gauss:
+            self._jump = None
+        if biased_gauss > self._fits_gauss or turned_gauss < contradicted_gauss:
+            return None
+        self._jump = None
+        return jump
+
+
+def _size(rate: Vector) -> float:
+    p, q, r = rate
+    return abs(p) + abs(q) + abs(r)
+
+
+def _less(rate: Vector, other: Vector) -> Vector:
+    (p, q, r), (a, b, c) = rate, other
+    return (p - a, q - b, r - c)
+
+
+def _turned(field: Vector, rate: Vector, time_s: float) -> Vector:
+    """Return the components of a fixed vector after a turn of the axes, to second order."""
+    (x, y, z), (p, q, r) = field, (rate[0] * time_s, rate[1] * time_s, rate[2] * time_s)
+    dx, dy, dz = y * r - z * q, z * p - x * r, x * q - y * p
+    return (
+        x + dx + 0.5 * (dy * r - dz * q),
+        y + dy + 0.5 * (dz * p - dx * r),
+        z + dz + 0.5 * (dx * q - dy * p),
+    )
