@@ -10,7 +10,7 @@ from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
 _LEAST_RAD_S = 0.5  # of a jump, summed over the axes; the filter finds smaller biases in time
-_BEFORE_PART, _AFTER_PART = 0.25, 0.5  # of the jump: larger changes before it, or after (by the law), end the test
+_BEFORE_PART, _AFTER_PART = 0.25, 0.8  # of the jump: larger changes before it, or after (by the law), end the test
 _FITS_PART, _FITS_SIGMAS = 0.02, 5.0  # of the field and of its noise: a prediction with a smaller error fits
 _CONTRADICTED = 2.0  # times that: the least error of the other prediction
 _WITHIN_S = 0.4
@@ -37,15 +37,16 @@ class RateJump:
         (a, b, c), (p, q, r) = before, rate
         last, change = self._change, (p - a, q - b, r - c)
         size, bias = _size(change), None
+        examined = _size(self._jump) if self._jump is not None else _LEAST_RAD_S
         self._change = change
         self._field_s += interval_s
-        if size > _LEAST_RAD_S and _size(last) < _BEFORE_PART * size:
+        if size > examined and _size(last) < _BEFORE_PART * size:
             self._jump, self.samples = _less(change, last), 0
         elif self._jump is not None:
             self.samples += 1
             if self.samples > 1:
                 bias = self._follow(self._jump, rate, interval_s, field)
-            elif self._field is None or size > _AFTER_PART * _size(self._jump):
+            elif self._field is None or size > _AFTER_PART * examined:
                 self._jump = None
             else:
                 self._begin(self._field, self._jump, rate, interval_s)

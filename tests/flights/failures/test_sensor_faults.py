@@ -132,7 +132,7 @@ def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(sitl: Sitl, kind:
 @pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
 def test_with_a_large_gyroscope_bias_it_flies_on(sitl: Sitl) -> None:
     sitl.takeoff(2.0)
-    sitl.inject("gyro", "wrong", 0, 2.0, -1.0, 0.0)
+    sitl.inject("gyro", "wrong", 0, -2.0, 1.0, 0.0)
     sitl.hold(lambda: sitl.tilt_deg < 60.0, for_=2.0)
     assert sitl.mode is Mode.HOLD
 
