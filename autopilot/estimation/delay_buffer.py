@@ -4,6 +4,7 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colibri.autopilot.estimation.eskf_predict import BLIND_FORCE, BLIND_RATE, FORCE, RATE, SAMPLE
 from colibri.autopilot.estimation.measurements.instrument import Value
@@ -55,7 +56,7 @@ class DelayBuffer:
         taken = max(since - len(self.waiting), 0)
         return taken * float(self.samples[self.first, 0])
 
-    def _rows(self, count: int) -> Array:
+    def _rows(self, count: int) -> NDArray[np.intp]:
         return np.arange(self.first, self.first + count) % len(self.samples)
 
 
