@@ -49,7 +49,10 @@ class DelayBuffer:
         return p, q, r
 
     def add_bias(self, bias: Vector, since: int) -> float:
-        """Add to the rates before the last `since` samples, which have it; return the time with it taken before, s."""
+        """Add a bias, rad/s, to the waiting rates but the last `since`, which have it already.
+
+        Return the duration, s, of the samples with it that the filter has taken.
+        """
         rows = self._rows(len(self.waiting) - since)
         self.samples[rows, RATE : RATE + 3] += bias
         self.samples[rows[-1:], RATE : RATE + 3] -= 0.5 * np.array(bias)  # the jump was in this sample
@@ -64,7 +67,7 @@ class DelayBuffer:
 def roughness(samples: Array, first: int, count: int, force: float, rate: float) -> tuple[float, float]:
     """Return the parts of `count` samples whose second differences exceed those of `force` and `rate`.
 
-    White noise exceeds them all the time; a knock, even with the standard deviation of noise, does so seldom.
+    White noise exceeds them in most samples; a knock, even with the standard deviation of noise, in few.
     """
     n, found, rough = len(samples), 0, [0, 0]
     for k in range(2, count):

@@ -266,7 +266,7 @@ class Filter:
         self.gyro_bias_us = time_us
 
     def jump_gyro_bias(self, bias: Vector, misturned_s: float, time_us: int) -> None:
-        """Change the bias, which has turned the attitude for a time."""
+        """Add to the gyroscope bias, rad/s, by which the attitude has been turned for `misturned_s`."""
         self.x[10:13] += bias
         size = hypot(*bias)
         update.inflate_covariance(self.P, GYRO_BIAS, 3, square(_JUMPED_PART * size))

@@ -19,7 +19,6 @@ from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
 from colibri.autopilot.estimation.sensing.free_fall import Falling
 from colibri.autopilot.estimation.sensing.inertial import Expected, Inertial, InertialReading
 from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
-from colibri.autopilot.estimation.sensing.rate_jump import RateJump
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.compiled_geodesy import enu_of
@@ -86,7 +85,6 @@ class Estimator:
         self._at_rest: list[Value | None] = [None] * len(instruments)
         self._reads_messages = not all(instrument.group for instrument in instruments)
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
-        self._rate_jump = RateJump(sensors, self.filter.field_gauss)
         self._output_smoothing = OutputSmoothing()
         self._clock_resets = ClockResets()
         self._buffer = DelayBuffer(self._capacity)
@@ -99,7 +97,7 @@ class Estimator:
         self._estimate: Estimate | None = None
         self._tests: Tests | None = None
         self._resets = 0
-        self._inertial_watch = InertialWatch(self._inertial)
+        self._inertial_watch = InertialWatch(self._inertial, sensors, self.filter.field_gauss)
 
     @property
     def last(self) -> Estimate | None:
@@ -175,26 +173,15 @@ class Estimator:
             buffer = self._buffer
             if len(buffer.waiting) == len(buffer.samples):
                 self._take(frame.time_us)
-            buffer.put(before, self._reading, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
-            self._look_for_jump(before, frame.time_us, (frame.time_us - last_us) * 1e-6, values)
+            interval_s = (frame.time_us - last_us) * 1e-6
+            buffer.put(before, self._reading, interval_s, Waiting(frame.time_us, values))
+            self._inertial_watch.look_for_jump(buffer, self.filter, before, self._reading, interval_s)
             self._take_until(frame.time_us)
             if fix is not None:
                 self._fuse(fix, frame.time_us)
         self._unpublished = True
         if self._estimate is None:
             self._publish(frame.time_us)
-
-    def _look_for_jump(
-        self, before: InertialReading, now_us: int, interval_s: float, values: list[Value | None] | None
-    ) -> None:
-        if not (before.rate_good and self._reading.rate_good) or self.filter.magnetometer.kind.rejected_us is not None:
-            self._rate_jump.forget()
-            return
-        field, _ = self._field_and_height(values)
-        bias = self._rate_jump.look(before.rate, self._reading.rate, interval_s, field)
-        if bias is not None:
-            misturned_s = self._buffer.add_bias(bias, self._rate_jump.samples)
-            self.filter.jump_gyro_bias(bias, misturned_s, now_us)
 
     def record(self) -> bytes:
         self.advance()

@@ -9,11 +9,13 @@ from math import copysign, hypot, sqrt
 
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, learn_drag, roughness
 from colibri.autopilot.estimation.eskf import Filter
-from colibri.autopilot.estimation.sensing.inertial import Inertial
+from colibri.autopilot.estimation.sensing.inertial import Inertial, InertialReading
+from colibri.autopilot.estimation.sensing.rate_jump import RateJump
+from colibri.plant.vehicle.sensors import Sensors
 
 _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
 _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
-_WILD_TIMES = 4.0  # the noise of rates that would tip the vehicle over in this time
+_WILD_TIMES = 4.0  # noise of the gyroscope that would tip the vehicle over within these checks: one is enough
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
 _MEAN_PART, _HIGH_SIGMAS = 0.2, 2.5  # filter gain of the mean innovation of pressures, and what contradicts
@@ -25,8 +27,9 @@ _MAX_TURN_RAD = 0.3  # beyond this the field is implausible
 class InertialWatch:
     """Marks the inertial sensors of one vehicle as failed."""
 
-    def __init__(self, inertial: Inertial) -> None:
+    def __init__(self, inertial: Inertial, sensors: Sensors, field_gauss: float) -> None:
         self._inertial = inertial
+        self._rate_jump = RateJump(sensors, field_gauss)
         self._rough = [0, 0]
         self._bias_m_s2 = self._high = 0.0  # the mean innovation of the pressures, in σ
         self._pressure_us = -1
@@ -55,6 +58,18 @@ class InertialWatch:
             steep = up * up * velocity.test.nis > _STEEP * (east * east + north * north + up * up)
             long = now_us - velocity.rejected_us > _BOTH_REJECTED_US
             inertial.accelerometer.failed |= long and steep and up * self._high > 0.0
+
+    def look_for_jump(
+        self, buffer: DelayBuffer, filter_: Filter, before: InertialReading, now: InertialReading, interval_s: float
+    ) -> None:
+        """Examine the newest waiting sample, between two readings, for a gyroscope bias."""
+        if not (before.rate_good and now.rate_good) or filter_.magnetometer.kind.rejected_us is not None:
+            self._rate_jump.forget()
+            return
+        time_us, values = buffer.waiting[-1]
+        bias = self._rate_jump.look(before.rate, now.rate, interval_s, values[0] if values else None)
+        if bias is not None:
+            filter_.jump_gyro_bias(bias, buffer.add_bias(bias, self._rate_jump.samples), time_us)
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""

@@ -5,9 +5,12 @@ A jump about the field itself turns no field; it stays undecided, for the filter
 """
 
 from math import dist
+from typing import TypeAlias
 
 from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
+
+Field: TypeAlias = tuple[float, ...]  # x, y, z, gauss
 
 _LEAST_RAD_S = 0.5  # of a jump, summed over the axes; the filter finds smaller biases in time
 _BEFORE_PART, _AFTER_PART = 0.25, 0.8  # of the jump: larger changes before it, or after (by the law), end the test
@@ -17,23 +20,24 @@ _WITHIN_S = 0.4
 
 
 class RateJump:
-    """Watches the rates of one vehicle; `samples` have been taken since the jump."""
+    """Watches the rates of one vehicle; `samples` counts the samples since the jump."""
 
     def __init__(self, sensors: Sensors, field_gauss: float) -> None:
         self._fits_gauss = max(_FITS_PART * field_gauss, _FITS_SIGMAS * sensors.magnetometer.noise_gauss)
-        self._field: Vector | None = None  # the last one
+        self._field: Field | None = None  # last measured
         self._field_s = 0.0  # its age
-        self._change: Vector = (0.0, 0.0, 0.0)  # of the last sample
-        self._jump: Vector | None = None  # that is examined
-        self._with = self._without = self._change  # the jump, fields now
-        self._within_s = 0.0
+        self._change: Vector = (0.0, 0.0, 0.0)  # in the last sample, rad/s
+        self._jump: Vector | None = None  # under examination, rad/s
+        self._if_turn: Field = self._change  # predicted fields, gauss
+        self._if_bias: Field = self._change
+        self._left_s = 0.0  # for the decision
         self.samples = 0
 
     def forget(self) -> None:
         self._jump = self._field = None
 
-    def look(self, before: Vector, rate: Vector, interval_s: float, field: Vector | None) -> Vector | None:
-        """Take the rates at both ends of a sample and the field at its end, FLU; return a jump that is a bias."""
+    def look(self, before: Vector, rate: Vector, interval_s: float, field: Field | None) -> Vector | None:
+        """Take the rates, rad/s, at both ends of a sample and the field, gauss, at its end, FLU; return a bias."""
         (a, b, c), (p, q, r) = before, rate
         last, change = self._change, (p - a, q - b, r - c)
         size, bias = _size(change), None
@@ -54,29 +58,26 @@ class RateJump:
             self._field, self._field_s = field, 0.0
         return bias
 
-    def _begin(self, field: Vector, jump: Vector, rate: Vector, interval_s: float) -> None:
+    def _begin(self, field: Field, jump: Vector, rate: Vector, interval_s: float) -> None:
         """Predict the field after one sample with the jump, and the half of one in which it began."""
         after_s = min(1.5 * interval_s, self._field_s)
         field = _turned(field, _less(rate, jump), self._field_s - after_s)
-        self._with, self._without = _turned(field, rate, after_s), _turned(field, _less(rate, jump), after_s)
-        self._within_s = _WITHIN_S
+        self._if_turn, self._if_bias = _turned(field, rate, after_s), _turned(field, _less(rate, jump), after_s)
+        self._left_s = _WITHIN_S
 
-    def _follow(self, jump: Vector, rate: Vector, interval_s: float, field: Vector | None) -> Vector | None:
-        self._with = _turned(self._with, rate, interval_s)
-        self._without = _turned(self._without, _less(rate, jump), interval_s)
-        self._within_s -= interval_s
-        if self._within_s < 0.0:
+    def _follow(self, jump: Vector, rate: Vector, interval_s: float, field: Field | None) -> Vector | None:
+        self._if_turn = _turned(self._if_turn, rate, interval_s)
+        self._if_bias = _turned(self._if_bias, _less(rate, jump), interval_s)
+        self._left_s -= interval_s
+        is_turn = is_bias = False
+        if field is not None:
+            fits_gauss, contradicted_gauss = self._fits_gauss, _CONTRADICTED * self._fits_gauss
+            turn_gauss, bias_gauss = dist(field, self._if_turn), dist(field, self._if_bias)
+            is_turn = turn_gauss < fits_gauss and bias_gauss > contradicted_gauss
+            is_bias = bias_gauss < fits_gauss and turn_gauss > contradicted_gauss
+        if is_turn or is_bias or self._left_s < 0.0:
             self._jump = None
-        if field is None:
-            return None
-        turned_gauss, biased_gauss = dist(field, self._with), dist(field, self._without)
-        contradicted_gauss = _CONTRADICTED * self._fits_gauss
-        if turned_gauss < self._fits_gauss and biased_gauss > contradicted_gauss:
-            self._jump = None
-        if biased_gauss > self._fits_gauss or turned_gauss < contradicted_gauss:
-            return None
-        self._jump = None
-        return jump
+        return jump if is_bias else None
 
 
 def _size(rate: Vector) -> float:
@@ -89,7 +90,7 @@ def _less(rate: Vector, other: Vector) -> Vector:
     return (p - a, q - b, r - c)
 
 
-def _turned(field: Vector, rate: Vector, time_s: float) -> Vector:
+def _turned(field: Field, rate: Vector, time_s: float) -> Field:
     """Return the components of a fixed vector after a turn of the axes, to second order."""
     (x, y, z), (p, q, r) = field, (rate[0] * time_s, rate[1] * time_s, rate[2] * time_s)
     dx, dy, dz = y * r - z * q, z * p - x * r, x * q - y * p

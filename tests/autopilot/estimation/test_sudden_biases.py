@@ -1,4 +1,4 @@
-"""A sudden bias of accelerometer or gyroscope is found, and nothing that looks like one is taken for it."""
+"""Sudden biases of accelerometer and gyroscope are detected, without false alarms."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -94,7 +94,7 @@ def test_a_receiver_that_lies_is_no_bias(path: source.Path, lie: GpsLie) -> None
 
 @pytest.mark.parametrize("late_s", [0.2, 0.5, 1.0])
 def test_a_late_receiver_is_no_accelerometer_bias(late_s: float) -> None:
-    """It goes from rest to its circle while all of GPS tells what was."""
+    """The vehicle begins its circle while the receiver still reports rest."""
     flight = recorded(source.circle, 4, 12.0)
     fixes = {frame.time_us: frame.gps for frame in flight.frames if frame.gps is not None}
 
