@@ -74,7 +74,7 @@ class Estimator:
     def _restart(self) -> None:
         sensors = self._sensors
         self._inertial = Inertial(sensors, self._rejected)
-        self._gps_watch = GpsWatch()
+        self._gps_watch = GpsWatch(sensors.gps)
         self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
         self.caught = False
         self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)

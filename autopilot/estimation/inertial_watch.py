@@ -15,7 +15,7 @@ from colibri.plant.vehicle.sensors import Sensors
 
 _ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25  # white noise of a sensor that has failed
 _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6  # in a row, because a knock is rough for one
-_WILD_TIMES = 4.0  # noise of the gyroscope that would tip the vehicle over within these checks: one is enough
+_SHAKES = 6  # samples of wild rates, less the calm ones between: noise that tips a vehicle over within 0.1 s
 _MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
 _BOTH_REJECTED_US = 300_000  # GPS velocity and barometer contradict alike: the accelerometer is the common cause
 _MEAN_PART, _HIGH_SIGMAS = 0.2, 2.5  # filter gain of the mean innovation of pressures, and what contradicts
@@ -42,12 +42,9 @@ class InertialWatch:
         learn_drag(*waiting, filter_.x, filter_.drag)
         for sensor, part in enumerate(parts):
             rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
-        if rough[1] and roughness(*waiting, _ROUGH_M_S2, _WILD_TIMES * _ROUGH_RAD_S)[1] > _ROUGH_PART:
-            rough[1] = _ROUGH_CHECKS
         inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS
-        if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
-            inertial.gyroscope.failed = inertial.gyroscope.noisy = True
-            inertial.gyroscope.value = buffer.mean_rate()
+        if rough[1] >= _ROUGH_CHECKS:
+            self._inertial.doubt_rates(buffer.median_rate())
         test, before_us = filter_.barometer.kind.test, self._pressure_us
         self._pressure_us = test.time_us
         sigmas = copysign(sqrt(min(test.nis, test.gate)), test.innovation[0]) if test.time_us > before_us else 0.0
@@ -62,14 +59,19 @@ class InertialWatch:
     def look_for_jump(
         self, buffer: DelayBuffer, filter_: Filter, before: InertialReading, now: InertialReading, interval_s: float
     ) -> None:
-        """Examine the newest waiting sample, between two readings, for a gyroscope bias."""
-        if not (before.rate_good and now.rate_good) or filter_.magnetometer.kind.rejected_us is not None:
-            self._rate_jump.forget()
+        """Examine the newest waiting sample, between two readings, for wild noise or a bias of the gyroscope."""
+        jump, (time_us, values) = self._rate_jump, buffer.waiting[-1]
+        if not (before.rate_good and now.rate_good):
+            jump.forget()
             return
-        time_us, values = buffer.waiting[-1]
-        bias = self._rate_jump.look(before.rate, now.rate, interval_s, values[0] if values else None)
+        if filter_.magnetometer.kind.rejected_us is not None:
+            jump.forget()
+            values = None
+        bias = jump.look(before.rate, now.rate, interval_s, values[0] if values else None)
         if bias is not None:
-            filter_.jump_gyro_bias(bias, buffer.add_bias(bias, self._rate_jump.samples), time_us)
+            filter_.jump_gyro_bias(bias, buffer.add_bias(bias, jump.samples), time_us)
+        if jump.shakes >= _SHAKES:
+            self._inertial.doubt_rates(buffer.median_rate())
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""

@@ -17,6 +17,7 @@ _BEYOND_RANGE = 1.01  # tolerance for resolution at the end of the range
 _BRIDGED_US = 20_000  # validity of the last good value when values are missing
 _FROZEN_US = 12_000  # the same when it is repeated, though it has noise: a frozen turn would be flown against
 _NOISY_1_S = 10.0  # bandwidth at which the model follows a noisy gyroscope
+_NOISE_RAD_S = 0.5  # difference beyond which a noisy gyroscope counts no more: the larger the noise, the slower
 _MAX_STEP_S = 0.02
 # A sensor without values for so long, and in so many frames, has failed: those that come later may be as late.
 _FAILED_M_S2_US, _FAILED_RAD_S_US, _FAILED_FRAMES = 45_000, 15_000, 4
@@ -76,12 +77,20 @@ class Inertial:
             *(gyro.noise_density_rad_s_rthz, _FAILED_RAD_S_US),
         )
 
+    def doubt_rates(self, rate: Vector) -> None:
+        """Let the model follow the gyroscope, which has become noisy, from a rate, rad/s FLU, on."""
+        gyroscope = self.gyroscope
+        if gyroscope.time_us is not None and not gyroscope.failed:
+            gyroscope.failed = gyroscope.noisy = True
+            self._turns = gyroscope.time_us, rate
+
     def read(self, frame: SensorFrame) -> InertialReading:
         force_good = self.accelerometer.read(frame, frame.specific_force_flu_m_s2, self._rejected)
         rate_good = self.gyroscope.read(frame, frame.rate_flu_rad_s, self._rejected)
         reading = InertialReading(self.accelerometer.value, self.gyroscope.value, force_good, rate_good)
-        if (force_good and rate_good) or self.expected is None:
+        if rate_good:
             self._turns = None
+        if (force_good and rate_good) or self.expected is None:
             return reading
         across, along, thrust_m_s2, *turn = self.expected
         if not force_good:
@@ -92,7 +101,10 @@ class Inertial:
             rate = (p + turn[0] * dt, q + turn[1] * dt, r + turn[2] * dt)
             if self.gyroscope.noisy:
                 part = min(_NOISY_1_S * dt, 1.0)
-                p, q, r = (old + part * (new - old) for old, new in zip(rate, self.gyroscope.value, strict=True))
+                p, q, r = (
+                    old + part * max(-_NOISE_RAD_S, min(new - old, _NOISE_RAD_S))
+                    for old, new in zip(rate, self.gyroscope.value, strict=True)
+                )
                 rate = (p, q, r)
             self._turns = frame.time_us, rate
             reading = reading._replace(rate=rate, rate_modelled=True)

@@ -5,6 +5,7 @@ from math import inf, isfinite
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.geodesy import is_on_earth
 from colibri.mavlink.hil.sensors import GpsFix
+from colibri.plant.vehicle.sensors import Gps
 
 _MAX_SPEED_M_S = 100.0
 _MIN_HEIGHT_M, _MAX_HEIGHT_M = -1000.0, 30e3
@@ -16,7 +17,7 @@ _SETTLED = 25  # frames out of sequence after which the clock counts as reset
 
 
 class Watch:
-    """Checks one sensor; `is_new` is false for values that simulators repeat."""
+    """Checks one sensor; `is_new` is false for values that repeat."""
 
     def __init__(self, source: str, minimum: float, maximum: float, patience_us: float) -> None:
         self._source, self._minimum, self._maximum, self._patience_us = source, minimum, maximum, patience_us
@@ -40,8 +41,9 @@ class Watch:
 
 
 class GpsWatch:
-    def __init__(self) -> None:
+    def __init__(self, gps: Gps) -> None:
         self.time_us: int | None = None
+        self._may_repeat = gps.velocity_noise_m_s == 0.0
         self._alive = Watch(RejectedSource.GPS, -inf, inf, _GPS_PATIENCE_US)
 
     def accepts(self, fix: GpsFix, now_us: int, rejected: Rejected) -> bool:
@@ -54,7 +56,7 @@ class GpsWatch:
             rejected.add(RejectedSource.GPS, Reason.TIME)
         else:
             self.time_us = fix.time_us
-            return self._alive.accepts(numbers, fix.time_us, rejected)
+            return self._alive.accepts(numbers, fix.time_us, rejected) and (self._alive.is_new or self._may_repeat)
         return False
 
 

@@ -17,10 +17,14 @@ _BEFORE_PART, _AFTER_PART = 0.25, 0.8  # of the jump: larger changes before it, 
 _FITS_PART, _FITS_SIGMAS = 0.02, 5.0  # of the field and of its noise: a prediction with a smaller error fits
 _CONTRADICTED = 2.0  # times that: the least error of the other prediction
 _WITHIN_S = 0.4
+_WILD_RAD_S = 3.0  # of the difference between two changes, summed over the axes
 
 
 class RateJump:
-    """Watches the rates of one vehicle; `samples` counts the samples since the jump."""
+    """Watches the rates of one vehicle.
+
+    `samples` counts the samples since the jump, `shakes` those of wild noise, less the calm ones between.
+    """
 
     def __init__(self, sensors: Sensors, field_gauss: float) -> None:
         self._fits_gauss = max(_FITS_PART * field_gauss, _FITS_SIGMAS * sensors.magnetometer.noise_gauss)
@@ -31,7 +35,7 @@ class RateJump:
         self._if_turn: Field = self._change  # predicted fields, gauss
         self._if_bias: Field = self._change
         self._left_s = 0.0  # for the decision
-        self.samples = 0
+        self.samples = self.shakes = 0
 
     def forget(self) -> None:
         self._jump = self._field = None
@@ -44,6 +48,10 @@ class RateJump:
         examined = _size(self._jump) if self._jump is not None else _LEAST_RAD_S
         self._change = change
         self._field_s += interval_s
+        if size > _LEAST_RAD_S and _size(_less(change, last)) > _WILD_RAD_S:
+            self.shakes += 1
+        elif self.shakes > 0:
+            self.shakes -= 1
         if size > examined and _size(last) < _BEFORE_PART * size:
             self._jump, self.samples = _less(change, last), 0
         elif self._jump is not None:
