@@ -71,7 +71,7 @@ class InertialWatch:
         if bias is not None:
             filter_.jump_gyro_bias(bias, buffer.add_bias(bias, jump.samples), time_us)
         if jump.shakes >= _SHAKES:
-            self._inertial.doubt_rates(buffer.median_rate())
+            self._inertial.doubt_rates(buffer.median_rate(_SHAKES + 2))
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""

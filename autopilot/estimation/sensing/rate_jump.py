@@ -18,6 +18,7 @@ _FITS_PART, _FITS_SIGMAS = 0.02, 5.0  # of the field and of its noise: a predict
 _CONTRADICTED = 2.0  # times that: the least error of the other prediction
 _WITHIN_S = 0.4
 _WILD_RAD_S = 3.0  # of the difference between two changes, summed over the axes
+_JUMP_SHAKES = 2  # that one jump makes
 
 
 class RateJump:
@@ -56,7 +57,9 @@ class RateJump:
             self._jump, self.samples = _less(change, last), 0
         elif self._jump is not None:
             self.samples += 1
-            if self.samples > 1:
+            if self.shakes > _JUMP_SHAKES:
+                self._jump = None
+            elif self.samples > 1:
                 bias = self._follow(self._jump, rate, interval_s, field)
             elif self._field is None or size > _AFTER_PART * examined:
                 self._jump = None
