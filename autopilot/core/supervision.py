@@ -90,7 +90,7 @@ class Supervision:
         if rotor_loss.look(state, sent, charge_ah, airborne=airborne, ground_m=pilot.ground.height_m):
             assert rotor_loss.lost is not None, "what is lost has a number"
             pilot.readiness.lose_rotor(rotor_loss.lost, rotor_loss.remaining, lands=rotor_loss.landing_for is not None)
-        if not feels:
+        if not feels or parts.state_source.shaken:
             parts.state_source.help_inertial(rotor_loss.watch.expected, armed=pilot.state.armed)
 
     def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:

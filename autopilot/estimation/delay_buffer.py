@@ -44,10 +44,8 @@ class DelayBuffer:
         self.first = (self.first + 1) % len(self.samples)
         return self.waiting.popleft()
 
-    def median_rate(self, since: int = 0) -> Vector:
-        """Return the median of the waiting rates but the last `since`, rad/s, if others wait."""
-        count = len(self.waiting)
-        p, q, r = np.median(self.samples[self._rows(count - since if count > since else count), RATE : RATE + 3], axis=0).tolist()
+    def median_rate(self) -> Vector:
+        p, q, r = np.median(self.samples[self._rows(len(self.waiting)), RATE : RATE + 3], axis=0).tolist()
         return p, q, r
 
     def add_bias(self, bias: Vector, since: int) -> float:

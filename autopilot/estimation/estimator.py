@@ -343,6 +343,10 @@ class Estimator:
         if rate_modelled != before.rate_modelled:
             self.filter.replace_rate(modelled=rate_modelled)
 
+    @property
+    def shaken(self) -> bool:
+        return self._inertial.shaken
+
     def expect(self, expected: Expected | None) -> None:
         """Set the motion that the rotors cause, for inertial sensors that have failed."""
         self._inertial.expected = expected

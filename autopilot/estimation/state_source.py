@@ -105,6 +105,11 @@ class StateSource:
         if self._estimating is not None:
             self._estimating.settle()
 
+    @property
+    def shaken(self) -> bool:
+        """Whether the model of the rotors may be needed soon in place of the gyroscope."""
+        return self._estimating is not None and self._estimating.shaken
+
     def help_inertial(self, expected: Expected, *, armed: bool) -> None:
         """Replace failed inertial sensors by the model of the rotors; at rest, try them again."""
         if self._estimating is not None:

@@ -68,6 +68,7 @@ class Inertial:
         self._rejected = rejected
         self.expected: Expected | None = None
         self._turns: tuple[int, Vector] | None = None
+        self.shaken = False
         self.accelerometer = InertialSensor(
             *(RejectedSource.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2),
             *(accel.noise_density_m_s2_rthz, _FAILED_M_S2_US),
@@ -77,25 +78,34 @@ class Inertial:
             *(gyro.noise_density_rad_s_rthz, _FAILED_RAD_S_US),
         )
 
-    def doubt_rates(self, rate: Vector) -> None:
-        """Let the model follow the gyroscope, which has become noisy, from a rate, rad/s FLU, on."""
+    def suspect_rates(self, before_us: int, before: Vector, *, shaken: bool) -> None:
+        """Let the model run beside a gyroscope while it shakes, from the rate before it, rad/s FLU, on."""
+        if shaken and not self.shaken:
+            self._turns = before_us, before
+        self.shaken = shaken
+
+    def doubt_rates(self, rate: Vector | None = None) -> None:
+        """Let the model follow the gyroscope, which has become noisy, from a rate, rad/s FLU, or where it is, on."""
         gyroscope = self.gyroscope
         if gyroscope.time_us is not None and not gyroscope.failed:
             gyroscope.failed = gyroscope.noisy = True
-            self._turns = gyroscope.time_us, rate
+            if rate is not None:
+                self._turns = gyroscope.time_us, rate
 
     def read(self, frame: SensorFrame) -> InertialReading:
         force_good = self.accelerometer.read(frame, frame.specific_force_flu_m_s2, self._rejected)
         rate_good = self.gyroscope.read(frame, frame.rate_flu_rad_s, self._rejected)
         reading = InertialReading(self.accelerometer.value, self.gyroscope.value, force_good, rate_good)
-        if rate_good:
+        if rate_good and not self.shaken:
             self._turns = None
-        if (force_good and rate_good) or self.expected is None:
+            if force_good:
+                self.expected = None
+        if self.expected is None:
             return reading
         across, along, thrust_m_s2, *turn = self.expected
         if not force_good:
             reading = reading._replace(force=(across, along, thrust_m_s2), force_modelled=True)
-        if not rate_good:
+        if not rate_good or self.shaken:
             before_us, (p, q, r) = self._turns or (self.gyroscope.time_us or frame.time_us, reading.rate)
             dt = min((frame.time_us - before_us) * 1e-6, _MAX_STEP_S)
             rate = (p + turn[0] * dt, q + turn[1] * dt, r + turn[2] * dt)
@@ -107,7 +117,8 @@ class Inertial:
                 )
                 rate = (p, q, r)
             self._turns = frame.time_us, rate
-            reading = reading._replace(rate=rate, rate_modelled=True)
+            if not rate_good:
+                reading = reading._replace(rate=rate, rate_modelled=True)
         return reading
 
 

@@ -58,8 +58,9 @@ def test_gps_that_reports_zero_is_not_followed(sitl: Sitl, monkeypatch: pytest.M
 @ON_SENSORS
 def test_a_stuck_gps_is_not_followed(sitl: Sitl) -> None:
     sitl.takeoff(2.0)
-    sitl.inject("gps", "stuck")
     sitl.goto(20.0, 0.0, 2.0, wait=False)
+    sitl.run(0.5)
+    sitl.inject("gps", "stuck")
     sitl.run(5.0)
     assert not sitl.said(OFF)
     assert dist(sitl.position, (20.0, 0.0, 2.0)) < 2.0
@@ -95,19 +96,20 @@ def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "kind", "says"),
+    ("fault", "says"),
     [
-        ("accel", "stuck", "Failsafe activated: accelerometer lost, land"),
-        ("accel", "garbage", "Failsafe activated: accelerometer lost, land"),
-        ("gyro", "off", "Failsafe activated: gyroscope lost, land"),
-        ("gyro", "garbage", "Failsafe activated: gyroscope lost, land"),
-        ("baro", "off", "Warning: barometer lost"),
+        (Fault("accel", "stuck"), "Failsafe activated: accelerometer lost, land"),
+        (Fault("accel", "garbage"), "Failsafe activated: accelerometer lost, land"),
+        (Fault("gyro", "off"), "Failsafe activated: gyroscope lost, land"),
+        (Fault("gyro", "garbage"), "Failsafe activated: gyroscope lost, land"),
+        (Fault("gyro", "garbage", (4.0,)), "Failsafe activated: gyroscope lost, land"),
+        (Fault("baro", "off"), "Warning: barometer lost"),
     ],
 )
 @pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
-def test_without_a_sensor_it_lands_softly(sitl: Sitl, unit: str, kind: str, says: str) -> None:
+def test_without_a_sensor_it_lands_softly(sitl: Sitl, fault: Fault, says: str) -> None:
     sitl.takeoff(3.0)
-    outcome = flown_on(sitl, [Fault(unit, kind)], watched_s=2.0)
+    outcome = flown_on(sitl, [fault], watched_s=2.0)
     assert not outcome.bad
     assert outcome.disarmed_s is not None
     assert outcome.disarmed_s < 10.0
