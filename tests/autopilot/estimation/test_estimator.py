@@ -218,6 +218,17 @@ def test_a_stuck_barometer_is_seen() -> None:
     assert error_m(flight, of, 13.9) < 1.0
 
 
+def test_a_stuck_receiver_is_not_fused() -> None:
+    flight = recorded(source.climb, 2, 14.0)
+    last_fix = [frame.gps for frame in flight.frames if frame.gps and frame.time_us < 5.5e6][-1]
+
+    def stuck(frame: SensorFrame) -> SensorFrame:
+        return frame._replace(gps=frame.gps and replace(last_fix, time_us=frame.gps.time_us))
+
+    of = estimates(flight.frames, since(5.5, stuck))
+    assert at(of, 6.6).health.gps_lost_since_us == last_fix.time_us
+
+
 @pytest.mark.parametrize("bad", [nan, float("inf"), 1e6, -1e6])
 def test_short_nonsense_of_inertial_sensors_is_bridged(bad: float) -> None:
     def nonsense(frame: SensorFrame) -> SensorFrame:

@@ -55,17 +55,6 @@ def test_gps_that_reports_zero_is_not_followed(sitl: Sitl, monkeypatch: pytest.M
     assert dist(sitl.position, (8.0, 0.0, 2.0)) < 2.0
 
 
-@ON_SENSORS
-def test_a_stuck_gps_is_not_followed(sitl: Sitl) -> None:
-    sitl.takeoff(2.0)
-    sitl.goto(20.0, 0.0, 2.0, wait=False)
-    sitl.run(0.5)
-    sitl.inject("gps", "stuck")
-    sitl.run(5.0)
-    assert not sitl.said(OFF)
-    assert dist(sitl.position, (20.0, 0.0, 2.0)) < 2.0
-
-
 @pytest.mark.sitl(feedback="sensors", ready=False)
 def test_before_the_first_estimate_commands_are_denied(sitl: Sitl) -> None:
     sitl.send("COMMAND_LONG", SYSTEM, COMPONENT, mav.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *(0.0,) * 6)
