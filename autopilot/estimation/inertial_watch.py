@@ -63,18 +63,18 @@ class InertialWatch:
         inertial, jump, (time_us, values) = self._inertial, self._rate_jump, buffer.waiting[-1]
         if not (before.rate_good and now.rate_good):
             jump.forget()
-            inertial.shaken = False
+            jump.shakes, inertial.shaken = 0, False
             return
         if filter_.magnetometer.kind.rejected_us is not None:
             jump.forget()
             values = None
         bias = jump.look(before.rate, now.rate, interval_s, values[0] if values else None)
-        inertial.suspect_rates(time_us - round(interval_s * 1e6), before.rate, shaken=jump.shakes > 0)
+        if inertial.shaken != (jump.shakes > 0):
+            inertial.suspect_rates(time_us - round(interval_s * 1e6), before.rate, shaken=jump.shakes > 0)
         if bias is not None:
             filter_.jump_gyro_bias(bias, buffer.add_bias(bias, jump.samples), time_us)
         if jump.shakes >= _SHAKES:
             inertial.doubt_rates()
-            jump.shakes = 0
 
     def look_at_bias(self, bias_m_s2: float) -> None:
         """Compare the accelerometer's largest bias after a reset with that after the last one."""

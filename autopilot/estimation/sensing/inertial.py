@@ -80,7 +80,7 @@ class Inertial:
 
     def suspect_rates(self, before_us: int, before: Vector, *, shaken: bool) -> None:
         """Let the model run beside a gyroscope while it shakes, from the rate before it, rad/s FLU, on."""
-        if shaken and not self.shaken:
+        if shaken:
             self._turns = before_us, before
         self.shaken = shaken
 
