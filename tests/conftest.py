@@ -3,6 +3,7 @@
 import gc
 import signal
 import threading
+from collections.abc import Iterator
 from importlib import import_module
 
 import pytest
@@ -18,6 +19,16 @@ use_one_thread()  # before numpy is loaded: two workers have a core each
 
 # A shell's background job ignores Ctrl-C, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="module")
+def forked() -> Iterator[None]:
+    """Have `tools.harness.processes` and `colibri sitl` fork what they start."""
+    forks = import_module("tests.support.forks")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
+        patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
+        yield
 
 
 def pytest_collection_finish() -> None:

@@ -24,6 +24,8 @@ from colibri.plant.spec import PlantSpec
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import WAITING, SitlProcess, vehicle, wait_for
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 
 
@@ -78,7 +80,7 @@ def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
 def test_a_process_that_dies_is_started_again(tmp_path: Path, name: str) -> None:
     with standing(tmp_path, WAITING) as (flown, children):
-        (victim,) = (child for child in children if name in child.cmdline()[3])
+        (victim,) = (child for child in children if child.name() == name)
         victim.send_signal(signal.SIGKILL)
         wait_for(lambda: flown.said.count("the plant sends frames") == 2, "the next one")
         died, *after = flown.said.partition("started again")[0::2]

@@ -10,6 +10,8 @@ import pytest
 from tests.support.commands import Refused, exit_code
 from tools.harness.processes import vehicle
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 LINK = "udpin:127.0.0.1:0"
 MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [
 {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397742, 8.545594, 2]},
@@ -33,14 +35,14 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path, capfd: pytest
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
     with vehicle(tmp_path) as flown:
-        options = ("--dry-run", "--duration", "1", "--min-pace", "1", "--max-age", "20000", "--max-gap", "20000")
-        ended = companion(tmp_path / "out", flown.port, str(mission), *options)
+        options = ["--dry-run", "--duration", "1", "--min-pace", "1", "--max-age", "20000", "--max-gap", "20000"]
+        to = ("--vehicle", f"udpout:127.0.0.1:{flown.port}")
+        assert not exit_code(["companion", str(mission), *options, *to, "--out", str(tmp_path / "out")])
         assert not any(sight.armed for sight in flown.seen.sights)
-        hover = ("companion", "hover", "--dry-run", "--wait", "0.3", "--out", str(tmp_path / "late"))
         capfd.readouterr()
-        assert exit_code([*hover, "--vehicle", f"udpout:127.0.0.1:{flown.port}"]) == 1
+        hover = ("companion", "hover", "--dry-run", "--wait", "0.3", "--out", str(tmp_path / "late"))
+        assert exit_code([*hover, *to]) == 1
         assert "timed out" in capfd.readouterr().err
-    assert ended.returncode == 0, ended.stderr
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert (report["stack"], report["setpoints"], report["in_order"]) == ("colibri", 0, True)
     rows = list(csv.DictReader((tmp_path / "out" / "companion.csv").read_text(encoding="utf-8").splitlines()))

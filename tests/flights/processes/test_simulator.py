@@ -7,6 +7,8 @@ import pytest
 
 from tools.harness.processes import Process, running, topic_rows, wait_for
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 
 @pytest.mark.long
 @pytest.mark.parametrize("vehicle", ["jmavsim", "hummingbird"])
