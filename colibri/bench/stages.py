@@ -15,7 +15,6 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc import planning
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
-from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
@@ -47,9 +46,7 @@ class Stage(NamedTuple):
 
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
-    Stage("estimate", planning, "begin"),
-    Stage("references", TargetBuilder, "on_clock"),
-    Stage("condense", planning, "condense"),
+    Stage("observe, references, condense", planning, "begin_by_clock"),
     Stage("QP", Mpc, "solve"),
     Stage("read plan", planning, "read"),
     Stage("mixer", rotor_lag, "actuate"),

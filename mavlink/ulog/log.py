@@ -1,9 +1,10 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
+from itertools import starmap
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -48,16 +49,16 @@ class TopicLog:
 
     def __init__(self, append: Callable[[bytes], object]) -> None:
         self.append = append
-        self._waiting: defaultdict[RowEncoder, list[bytes]] = defaultdict(list)
+        self._waiting: defaultdict[RowEncoder, list[tuple[float, ...]]] = defaultdict(list)
         self._queued: list[bytes] = []
         self._beginning = b""
 
     def begin(self, beginning: bytes) -> None:
         self._beginning = beginning
 
-    def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
+    def add(self, encoder: RowEncoder, row: tuple[float, ...]) -> None:
         waiting = self._waiting[encoder]
-        waiting.append(encoder.pack.pack(*row))
+        waiting.append(row)
         if len(waiting) >= encoder.block_rows:
             self._take(encoder)
 
@@ -79,7 +80,7 @@ class TopicLog:
     def _take(self, encoder: RowEncoder) -> None:
         self._append_queued()
         rows, self._waiting[encoder] = self._waiting[encoder], []
-        self._keep(encoder, b"".join(rows))
+        self._keep(encoder, b"".join(starmap(encoder.pack.pack, rows)))
 
     def _append_queued(self) -> None:
         queued, self._queued = self._queued, []

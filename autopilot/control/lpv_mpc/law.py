@@ -1,7 +1,7 @@
 """The LPV-MPC as a control law: references, observers and fallbacks."""
 
 from collections.abc import Mapping
-from math import ceil, inf, nan, radians
+from math import ceil, nan, radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -25,9 +25,9 @@ from colibri.autopilot.control.lpv_mpc import compromise, planning
 from colibri.autopilot.control.lpv_mpc.approach import Approach
 from colibri.autopilot.control.lpv_mpc.compromise import Deviation
 from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
-from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, Qps, WeightSettings
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
-from colibri.autopilot.control.lpv_mpc.planning import PREDICTED, Now
+from colibri.autopilot.control.lpv_mpc.planning import RECOVER_BEYOND, Now
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.autopilot.control.parts.level import levelled, seen_level
 from colibri.autopilot.control.parts.recovery import RecoverySettings, TurnGains, mix_with_priority, turning_moment
@@ -36,9 +36,7 @@ from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, VehicleTracker
 from colibri.autopilot.control.scaling import scaled
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
-from colibri.autopilot.control.vehicle_model.airframe import airframe_of
-from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, MEASURED, ObserverSettings
-from colibri.autopilot.control.vehicle_model.drag import with_learned
+from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, ObserverSettings
 from colibri.autopilot.control.vehicle_model.mass import MassSettings
 from colibri.autopilot.control.vehicle_model.mixer import mixing_of
 from colibri.common.config import Degrees, Negative, Positive, Table, read_settings
@@ -49,14 +47,9 @@ from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotati
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
 
-_RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
-_AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
-_SHARES, _ALWAYS = 3.0, 0.5
-"""In the first steps each rotor is limited to `_SHARES` times its share of the required thrust, but at least `_ALWAYS`
-times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
-
+_AS_PLANNED = cos(radians(15.0))  # no recovery from attitudes of the previous plan, within this angle
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
-_UPSIDE_DOWN, _NOTHING, _UNKNOWN = (0.0, 1.0, 0.0, 0.0), np.empty(0), np.empty((0, 0))
+_UPSIDE_DOWN, _UNKNOWN = (0.0, 1.0, 0.0, 0.0), np.empty((0, 0))
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -125,10 +118,10 @@ class LpvMpc(AttitudeController[LawMemory]):
         self.min_path_speed = settings.path.min_speed
         samples = ceil(settings.path.max_speed * (self._mpc.horizon + 2))
         self.preview = Preview(self.control_interval_us, samples if upright else max(samples, compromise.SAMPLES))
-        self._span_n = float(self.tracker.allocation[0].sum())
+        span_n = float(self.tracker.allocation[0].sum())
         if vehicle.rotors.count > len(AXES):  # without moments
-            self._span_n = min(self._span_n, 1.0 / float(self._mpc.from_wrench[:, 0].max()))
-        self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
+            span_n = min(span_n, 1.0 / float(self._mpc.from_wrench[:, 0].max()))
+        hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / span_n
         k1_s2, k2_s = gains(settings.guidance.poles)
         most_m_s2 = settings.guidance.max_acceleration_m_s2
         guidance = Approach(
@@ -144,18 +137,16 @@ class LpvMpc(AttitudeController[LawMemory]):
             self._mpc.from_wrench,
             self._mpc.turns,
         )
-        self._targets = TargetBuilder(guidance, settings.path, self._mpc, upright=upright)
+        self._targets = TargetBuilder(guidance, settings.path, self._mpc)
         min_squared = square(self.tracker.lag.min_speed)
-        min_n = self._span_n * min_squared
-        min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
+        min_n = span_n * min_squared
+        min_up_n = max(settings.guidance.min_thrust * hover_squared * span_n, min_n)
         self._force = ForceLimits(upright, tan(radians(max_tilt_deg)), min_n, min_n, min_up_n)
         rigid, squared = np.empty(RIGID), np.empty(vehicle.rotors.count)
         limits = np.full((self._mpc.horizon, 2), min_squared)
-        self._now = packed(Now(rigid, squared, _NO_DISTURBANCE, limits, self._force, self._span_n))
+        self._now = packed(Now(rigid, squared, _NO_DISTURBANCE, limits, self._force, span_n, hover_squared))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
-        self._model, self._airframe = self._mpc.model["airframe"], airframe_of(vehicle)
-        self._model_kg = self._model["mass_kg"]
 
     def warm_up(self) -> None:
         """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""
@@ -195,68 +186,80 @@ class LpvMpc(AttitudeController[LawMemory]):
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        observed = self._observe(memory, state)
-        return self._decide(memory, observed, self._targets.on_clock(self._now, references, memory.deviation))
+        if not self._force.upright:
+            state, observed = self._observe(memory, state)
+            wanted = self._targets.within_thrust(self._now, references, memory.deviation)
+            return self._decide(memory, state, observed, wanted, self._mpc.on_clock)
+        state, seen = self._seen(memory, state)
+        p, v, a, _, _, yaw, _, _ = references
+        last, targets, qps = memory.plan.commands if memory.plan else _UNKNOWN, self._targets, self._mpc.on_clock
+        begun, aim = planning.begin_by_clock(p, v, a, yaw, targets.law, targets.record, qps.kind, last, *seen)
+        observed, wanted = Observed(seen[-2], seen[-1], *begun), Wanted(targets.record, aim)
+        return self._decide(memory, state, observed, wanted, qps, condensed=True)
 
     def step_on_path(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        observed = self._observe(memory, state)
+        state, observed = self._observe(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
-        now = self._filled(observed)
-        wanted = self._targets.on_path(self._now, now, references, last, memory.lag_us * 1e-6)
-        return self._decide(memory, observed, wanted)
+        wanted = self._targets.on_path(self._now, self._opened_now(), references, last, memory.lag_us * 1e-6)
+        return self._decide(memory, state, observed, wanted, self._mpc.on_path)
 
     def step_attitude(
         self, memory: LawMemory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        observed = self._observe(memory, state)
-        wanted = self._targets.of_demand(self._now, self._filled(observed), demand)
-        return self._decide(memory, observed, wanted, on_track=False)
+        state, observed = self._observe(memory, state)
+        wanted = self._targets.of_demand(self._now, self._opened_now(), demand)
+        return self._decide(memory, state, observed, wanted, self._mpc.on_hold)
 
-    def _observe(self, memory: LawMemory, state: VehicleState) -> Observed:
-        """Observe the vehicle, and fill the start of a plan."""
-        (rotors, before, estimate_before, charge_ah, mass_kg), plan, age, _, _ = memory
+    def _observe(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, Observed]:
+        """Observe the vehicle, and fill the start of a plan; return the state in the level frame, too."""
+        state, seen = self._seen(memory, state)
+        return state, Observed(seen[-2], seen[-1], *planning.begin(*seen))
+
+    def _seen(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, tuple[Any, ...]]:
+        """Return the state in the level frame, and the arguments of `planning.begin`."""
+        (rotors, before, estimate, charge_ah, mass_kg), plan, age, _, _ = memory
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
-        position, velocity, attitude, (_, _, psi), rate, _, _, airborne = state
-        measured, estimate = np.empty(MEASURED), np.empty(estimate_before.size)
-        mass_kg, max_speed, current_a, max_n = planning.begin(
-            position, velocity, attitude, rate, rotors, _NOTHING if before is None else before, estimate_before,
-            mass_kg, charge_ah, airborne, _UNKNOWN if plan is None else plan.states[age:, PREDICTED:],
-            self.tracker.model, self.tracker.battery.numbers, self._now, measured, estimate,
+        position, velocity, attitude, _, rate, _, _, airborne = state
+        return state, (
+            position, velocity, attitude, rate, rotors, before, estimate, mass_kg, charge_ah, airborne,
+            _UNKNOWN if plan is None else plan.states, age, self.tracker.model, self.tracker.battery.numbers,
+            self._now, self._mpc.model, np.empty(MEASURED), np.empty(estimate.size),
         )  # fmt: skip
-        if estimate.size == ESTIMATES:
-            self._model_kg[0] = mass_kg
-        else:
-            self._model[0] = with_learned(self._airframe, mass_kg, estimate[ESTIMATES:])
-        return Observed(measured, estimate, mass_kg, max_speed, current_a, max_n, float(psi), airborne)
 
-    def _filled(self, observed: Observed) -> Now:
-        return self._arrays._replace(force=self._force._replace(max_n=observed.max_n))
+    def _opened_now(self) -> Now:
+        return self._arrays._replace(force=self._force._replace(max_n=self._now["force"]["max_n"].item()))
 
     def _decide(
-        self, memory: LawMemory, observed: Observed, wanted: Wanted, *, on_track: bool = True
+        self,
+        memory: LawMemory,
+        state: VehicleState,
+        observed: Observed,
+        wanted: Wanted,
+        qps: Qps,
+        *,
+        condensed: bool = False,
     ) -> tuple[LawMemory, Decision]:
+        """Decide by a plan, or without one by a fallback; the QP is `condensed` unless recovery may be needed."""
         (tracked, before, age, lag_us, _), (target, aim, path, deviation) = memory, wanted
         along_n, force_n, phi, theta, psi = aim
+        yaw = state.euler[2]
         mass_kg, path_lag_s = observed.mass_kg, lag_us * 1e-6 if path else nan
         plan: Plan | None = None
-        recovers = along_n < _RECOVER_BEYOND * force_n and not _planned(memory, observed)
+        turned_away = along_n < RECOVER_BEYOND * force_n
+        recovers = turned_away and not _planned(memory, observed)
         if recovers:
             how = Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s)
         else:
-            most = inf
-            if self._force.upright or not observed.airborne:
-                most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
-            last = before.commands[age:] if before else None
-            plan, how = self._mpc.plan(
-                self._now, target, last, observed.psi, most, path,
-                on_track=on_track, mass_kg=mass_kg, path_lag_s=path_lag_s,
-            )  # fmt: skip
+            if turned_away or not condensed:
+                last = before.commands[age:] if before else _UNKNOWN
+                self._mpc.condense(qps, self._now, target, last, along_n, state.airborne, path)
+            plan, how = self._mpc.plan(qps, yaw, path, mass_kg, path_lag_s)
         if plan is not None:
             squared, age = plan.commands[0], 1
         elif before is not None and not recovers and age <= min(self._shifted_samples, self._mpc.horizon - 1):
@@ -267,7 +270,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         commands, after = self.tracker.actuate(tracked, observed, squared)
         lag_us = self._lag_us(lag_us, plan, age) if path else 0
         memory = LawMemory(after, plan, age, lag_us, deviation)
-        return memory, Decision(commands, (phi, theta, nearest_turn(psi, observed.psi)), how)
+        return memory, Decision(commands, (phi, theta, nearest_turn(psi, yaw)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         if plan is None or plan.speeds is None:

@@ -1,6 +1,6 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
-from math import inf, nan, radians
+from math import inf, radians
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -75,7 +75,7 @@ class Corrections(NamedTuple):
     binding: tuple[int, int] = (0, 0)  # active soft limits of tilt and of rates
 
 
-class _Qps(NamedTuple):
+class Qps(NamedTuple):
     """A packed `QpKind`, the two QPs in its memory, and room for the minimum of the first."""
 
     kind: Packed
@@ -128,7 +128,7 @@ class Mpc:
             means,
             levels,
         )
-        self._on_clock, self._on_path, self._on_hold = (
+        self.on_clock, self.on_path, self.on_hold = (
             _opened(
                 QpKind(
                     Problem(
@@ -150,7 +150,7 @@ class Mpc:
             )
             for each, inputs in ((on_track, rotors), (on_track, rotors + 1), (on_hold, rotors))
         )
-        self._none = np.empty((0, rotors))
+        self._commands, self._states = (n, rotors), (n + 1, planning.PREDICTED + rotors)
 
     def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
         """Return S of the LQR in level flight after the horizon, filled up with zeros to a multiple of four."""
@@ -174,35 +174,26 @@ class Mpc:
         S[square] = 0.5 * (cost + cost.T)
         return S
 
-    def plan(
-        self,
-        now: Packed,
-        target: Packed,
-        last: Array | None,  # the previous plan's commands from now on, (n, m)
-        psi: float,  # unwrapped
-        most: float,  # largest squared speed of the first steps
-        path: PathNow | None = None,  # if the speed is free
-        *,
-        on_track: bool = True,  # else track attitude and thrust
-        mass_kg: float = nan,  # for the diagnostics, as is the lag
-        path_lag_s: float = nan,
-    ) -> tuple[Plan | None, Diagnostics]:
-        """Plan from `now` towards `target`; the plan is None if the QP is not solved."""
-        qps = self._on_path if path else self._on_clock if on_track else self._on_hold
-        last = self._none if last is None else last
+    def condense(
+        self, qps: Qps, now: Packed, target: Packed, last: Array, along_n: float, airborne: bool, path: PathNow | None
+    ) -> None:
+        """Fill the QP from `now` towards `target`, see `planning.condense`; with a `path` its speed is free."""
         if path is None:
-            planning.condense(now, target, last, most, self.model, qps.kind)
+            planning.condense(now, target, last, along_n, airborne, self.model, qps.kind)
         else:
-            planning.condense_on_path(now, target, last, most, path, self._effects, self.model, qps.kind)
+            planning.condense_on_path(now, target, last, along_n, airborne, path, self._effects, self.model, qps.kind)
+
+    def plan(
+        self, qps: Qps, psi: float, path: PathNow | None, mass_kg: float, path_lag_s: float
+    ) -> tuple[Plan | None, Diagnostics]:
+        """Solve the QP and read its plan, None if it is not solved; `psi` is unwrapped."""
         started_s = self._clock()
         status, z, iterations, slack, soft = self.solve(*qps)
         solve_time_s = self._clock() - started_s
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
-        rotors = self._none.shape[1]
-        commands = np.empty((self.horizon, rotors))
-        states = np.empty((self.horizon + 1, planning.PREDICTED + rotors))
+        commands, states = np.empty(self._commands), np.empty(self._states)
         binding = planning.read(qps.kind, z, psi, commands, states)
         active = Active(binding, 0, *soft)
         diagnostics = Diagnostics(
@@ -213,10 +204,10 @@ class Mpc:
 
     def warm_up(self) -> None:
         """Load compiled code of the soft limits, after a first plan."""
-        planning.limit(self._on_clock.kind)
-        z = np.zeros(len(self._on_clock.free.f))
-        planning.is_beyond(self._on_clock.kind, z)
-        planning.count_active(self._on_clock.kind, z)
+        planning.limit(self.on_clock.kind)
+        z = np.zeros(len(self.on_clock.free.f))
+        planning.is_beyond(self.on_clock.kind, z)
+        planning.count_active(self.on_clock.kind, z)
 
     def solve(self, kind: Packed, free: Qp, limited: Qp, minimum: Array) -> Corrections:
         """Return the optimal changes of the corrections.
@@ -278,7 +269,7 @@ def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
     return means, levels
 
 
-def _opened(kind: QpKind) -> _Qps:
+def _opened(kind: QpKind) -> Qps:
     record = packed(kind)
     free, limited = opened(record["qp"], Qp), opened(record["limited"], Qp)
-    return _Qps(record, free, limited, np.empty(len(free.f)))
+    return Qps(record, free, limited, np.empty(len(free.f)))

@@ -3,7 +3,7 @@
 Commands and corrections are squared rotor speeds in parts of the largest; m is the number of rotors.
 """
 
-from math import sqrt
+from math import inf, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -11,22 +11,33 @@ import numpy as np
 from colibri.autopilot.control.lpv_mpc.constraints import MOTION_ROWS, bound, exceeds, limit_motion
 from colibri.autopilot.control.lpv_mpc.cost import Integers, PlanReferences, Problem, cost, nearest_angle
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, RATE, ROTATION, StepTransition, respond
-from colibri.autopilot.control.lpv_mpc.feed_forward import lead
+from colibri.autopilot.control.lpv_mpc.feed_forward import follow, lead
 from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.vehicle_model.battery import common_speed, fill_limits, open_voltage_now, terminal
+from colibri.autopilot.control.vehicle_model.battery import (
+    charged_now,
+    common_speed,
+    fill_limits,
+    open_voltage_now,
+    terminal,
+)
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, limit_near_ground, observe
+from colibri.autopilot.control.vehicle_model.drag import with_learned
 from colibri.autopilot.control.vehicle_model.mass import follow_mass
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
+from colibri.common.elementary import cos
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.matrices import dot, put
 from colibri.common.types import Array, Quaternion, Vector
 
 PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 _BINDING = 1e-9  # an active limit has this or less left
-_LIMITED_STEPS = 3  # of the limit at low thrust
+RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
+_LIMITED_STEPS, _SHARES, _ALWAYS = 3, 3.0, 0.5
+"""In the first steps each rotor is limited to `_SHARES` times its share of the required thrust, but at least `_ALWAYS`
+times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
 
 
 class Now(NamedTuple):
@@ -38,6 +49,7 @@ class Now(NamedTuple):
     limits: Array  # least and largest squared speed of each step, (N, 2)
     force: ForceLimits  # demanded by references
     span_n: float  # thrust of all rotors at their largest speed
+    hover_squared: float
 
 
 class Workspace(NamedTuple):
@@ -64,14 +76,14 @@ class QpKind(NamedTuple):
 @compiled
 def begin(
     position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector, rotors: Array, before: Array,
-    estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool, expected: Array, tracker: Packed,
-    battery: Packed, now: Packed, measured: Array, estimate: Array,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Observe the vehicle, and fill the start of a plan; return mass, largest speed, current and largest thrust.
+    estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool, states: Array, age: int, tracker: Packed,
+    battery: Packed, now: Packed, vehicle: Packed, measured: Array, estimate: Array,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Observe the vehicle, and fill the start of a plan; return mass, charge a sample later, and largest speed.
 
-    Arguments are those of `VehicleState` and `Tracked`, `before` is (0,) at first. The power of `expected` squared
-    speeds, (n, m), or without them that of the present ones, limits the speeds. Filled are `measured` and `estimate` of
-    `Observed`, and `now` except constants.
+    Arguments are those of `VehicleState` and `Tracked`; `before`, and the `states` of the previous plan, are empty at
+    first. The power of its speeds, or without them that of the present ones, limits the speeds. Filled are `measured`
+    and `estimate` of `Observed`, `now` except constants, and the `vehicle`'s airframe.
     """
     start, model = now[0], tracker[0]
     speeds, wrench, mean_wrench = rotors[1, : start.squared.shape[0]], rotors[2], rotors[3]
@@ -92,47 +104,79 @@ def begin(
         mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], model.mass)
     else:
         limit_near_ground(estimate, estimate_before, model.observer)
+    airframe = vehicle[0].airframe
+    airframe.mass_kg = mass_kg
+    if estimate.shape[0] > ESTIMATES:
+        learned = with_learned(model.observer.airframe, mass_kg, estimate[ESTIMATES:])
+        airframe.drag_xy, airframe.drag_z, airframe.rotor_drag = learned.drag_xy, learned.drag_z, learned.rotor_drag
     for i in range(3):
         start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
     for i in range(speeds.shape[0]):
         start.squared[i] = speeds[i] * speeds[i]
     open_v, speed = open_voltage_now(battery[0], charge_ah), common_speed(charge_ah, battery)
-    if expected.shape[0] == 0:
-        expected = start.squared.copy().reshape((1, -1))
-    fill_limits(expected, open_v, battery, start.limits[:, 1])
+    if states.shape[0] > 0:
+        fill_limits(states[age:, PREDICTED:], open_v, battery, start.limits[:, 1])
+    else:
+        fill_limits(start.squared.copy().reshape((1, -1)), open_v, battery, start.limits[:, 1])
     start.force.max_n = start.span_n * (speed * speed)
     voltage_v, current_a = terminal(open_v, speeds, battery)
-    return mass_kg, voltage_v / battery[0].full_voltage_v, current_a, start.force.max_n
+    charge_ah = charged_now(charge_ah, current_a, model.observer.interval_s)
+    return mass_kg, charge_ah, voltage_v / battery[0].full_voltage_v
 
 
 @compiled
-def condense(now: Packed, target: Packed, last: Array, most: float, vehicle: Packed, kind: Packed) -> None:
+def begin_by_clock(
+    position_ahead: Array, velocity_ahead: Array, acceleration_ahead: Array, yaw_ahead: Array, law: Packed,
+    target: Packed, kind: Packed, commands: Array, position: Vector, velocity: Vector, attitude: Quaternion,
+    rate: Vector, rotors: Array, before: Array, estimate_before: Array, mass_kg: float, charge_ah: float,
+    airborne: bool, states: Array, age: int, tracker: Packed, battery: Packed, now: Packed, vehicle: Packed,
+    measured: Array, estimate: Array,
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float, float]]:  # fmt: skip
+    """Do in one call what `begin`, `follow` and, unless recovery may be needed, `condense` do; return their results."""
+    begun = begin(
+        position, velocity, attitude, rate, rotors, before, estimate_before, mass_kg, charge_ah, airborne, states, age,
+        tracker, battery, now, vehicle, measured, estimate,
+    )  # fmt: skip
+    aim = follow(now, position_ahead, velocity_ahead, acceleration_ahead, yaw_ahead, law, vehicle, target)
+    if not aim[0] < RECOVER_BEYOND * aim[1]:
+        condense(now, target, commands[age:], aim[0], airborne, vehicle, kind)
+    return begun, aim
+
+
+@compiled
+def condense(
+    now: Packed, target: Packed, last: Array, along_n: float, airborne: bool, vehicle: Packed, kind: Packed
+) -> None:
     """Fill the QP within the rotor limits.
 
-    `last`: the previous plan's commands from now on, (n, m); `most`: largest squared speed of the first steps.
+    `last`: the previous plan's commands from now on, (n, m); `along_n`: required thrust along the present body z.
     """
     work = kind[0].work
-    _expect(now[0], target[0], last, most, vehicle, kind[0])
+    _expect(now[0], target[0], last, along_n, airborne, vehicle, kind[0])
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
 
 
 @compiled
 def condense_on_path(
-    now: Packed, target: Packed, last: Array, most: float, path: PathNow, effects: SpeedEffects, vehicle: Packed,
-    kind: Packed,
+    now: Packed, target: Packed, last: Array, along_n: float, airborne: bool, path: PathNow, effects: SpeedEffects,
+    vehicle: Packed, kind: Packed,
 ) -> None:  # fmt: skip
     """Fill the QP with free speed along the path."""
     work = kind[0].work
-    _expect(now[0], target[0], last, most, vehicle, kind[0])
+    _expect(now[0], target[0], last, along_n, airborne, vehicle, kind[0])
     fill_slides(path, effects, work.responses)
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
     price(path, effects, kind[0].problem.starts, kind[0].qp)
 
 
 @inlined
-def _expect(now: Now, target: PlanReferences, last: Array, most: float, vehicle: Packed, kind: QpKind) -> None:
+def _expect(
+    now: Now, target: PlanReferences, last: Array, along_n: float, airborne: bool, vehicle: Packed, kind: QpKind
+) -> None:
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
-    commands, corrections = work.commands, work.corrections
+    commands, corrections, most = work.commands, work.corrections, inf
+    if now.force.upright or not airborne:
+        most = max(_SHARES * along_n / now.span_n, _ALWAYS * now.hover_squared)
     for step in range(min(_LIMITED_STEPS, commands.shape[0])):
         now.limits[step, 1] = min(now.limits[step, 1], most)
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)

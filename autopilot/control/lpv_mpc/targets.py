@@ -30,32 +30,31 @@ class Wanted(NamedTuple):
 
 
 class TargetBuilder:
-    def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc, *, upright: bool) -> None:
-        self._guidance, self._path, self._mpc, self._upright = guidance, path, mpc, upright
+    def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc) -> None:
+        self._guidance, self._path, self._mpc = guidance, path, mpc
         self._compromise, self._none = packed(compromise(guidance.interval_s)), Deviation.none()
-        self._law = packed(guidance)
+        self.law = packed(guidance)
         self._samples = n = mpc.horizon + 2
         rotors = len(mpc.from_wrench)
         track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, rotors))
         attitudes, scalars, end, force = np.zeros((n, 3, 3)), np.zeros(n), np.zeros(rotors), np.zeros(3)
-        self._record = packed(
+        self.record = packed(
             PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, end, force)
         )
-        self._target = target = opened(self._record, PlanReferences)
+        self._target = target = opened(self.record, PlanReferences)
         self.force = target.force  # of the last target
         self._near = (target.position, target.velocity, target.acceleration)
         self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
 
-    def on_clock(self, now: Packed, references: Horizon, deviation: Deviation | None) -> Wanted:
+    def within_thrust(self, now: Packed, references: Horizon, deviation: Deviation | None) -> Wanted:
+        """Return the target of references by the clock, or near those beyond the largest thrust."""
         p, v, a, _, _, yaw, _, _ = references
-        if not self._upright:
-            before = self._none if deviation is None else deviation
-            arrays = (before.motion.copy(), before.coefficients.copy(), before.dual.copy())
-            model, near = self._mpc.model, _motion(self._samples)
-            phase = stay_within(now, p, v, a, self._compromise, model, before.phase, *arrays, near)
-            (p, v, a), deviation = near, Deviation(phase, *arrays) if phase >= 0 else None
-        aim = feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record)
-        return Wanted(self._record, aim, None, deviation)
+        before = self._none if deviation is None else deviation
+        arrays = (before.motion.copy(), before.coefficients.copy(), before.dual.copy())
+        model, near = self._mpc.model, _motion(self._samples)
+        phase = stay_within(now, p, v, a, self._compromise, model, before.phase, *arrays, near)
+        aim = feed_forward.follow(now, *near, yaw, self.law, model, self.record)
+        return Wanted(self.record, aim, None, Deviation(phase, *arrays) if phase >= 0 else None)
 
     def on_path(self, record: Packed, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return the target of references at the path times of the previous plan.
@@ -79,19 +78,19 @@ class TargetBuilder:
         near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
         feasible = feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
         stop_s = stopping_s(now.disturbance, mpc.model)
-        approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self._law, near)
+        approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self.law, near)
         feed_forward.ask(
             now.rigid, near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat
         )
-        approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, stop_s, self._law, near)
+        approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, stop_s, self.law, near)
         feed_forward.ask(now.rigid, *ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
         target.yaw_rad[:], target.end_squared[:] = nominal[3], last_flat.squared[1]
         distance_m = norm(nominal[0][0] - now.rigid[:3])
         part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
         bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
-        target.force[:] = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
-        return Wanted(self._record, feed_forward.aim(record, self._record), PathNow(speeds, slopes, part, bounds))
+        target.force[:] = feed_forward.demanded_force(now.rigid, near, now.disturbance, self.law, limits, mpc.model)
+        return Wanted(self.record, feed_forward.aim(record, self.record), PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
         """Return the vehicle's speed along the path, (1,); 1 at a standstill."""
@@ -111,7 +110,7 @@ class TargetBuilder:
         target.yaw_rad[:], target.end_squared[:] = angles[:, 2], flat.squared[-1]
         target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
         target.force[:] = flat.forces[0]
-        return Wanted(self._record, feed_forward.aim(record, self._record))
+        return Wanted(self.record, feed_forward.aim(record, self.record))
 
     def _flat_of(self, n: int) -> Flat:
         rotors = len(self._mpc.from_wrench)

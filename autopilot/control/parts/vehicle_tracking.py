@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model import rotor_lag
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     ESTIMATES,
     ObserverModel,
@@ -26,7 +26,7 @@ _WRENCH = 4
 
 class Tracked(NamedTuple):
     rotors: Array  # rows: commands, vehicle's unit; speeds, parts of the largest; wrench; its last mean; (4, m >= 4)
-    measured: Array | None  # by the observer a sample ago, (9,)
+    measured: Array  # by the observer a sample ago, (9,); empty at first
     estimate: Array  # of the observer a sample ago, (12,)
     charge_ah: float
     mass_kg: float
@@ -38,11 +38,8 @@ class Observed(NamedTuple):
     measured: Array  # of the observer, (9,)
     estimate: Array  # of the observer, (12,)
     mass_kg: float
+    charge_ah: float  # a sample later
     max_speed: float  # available to a rotor while all keep their power, in parts of the largest
-    current_a: float
-    max_n: float  # largest thrust
-    psi: float  # yaw, rad, unwrapped
-    airborne: bool
 
 
 class TrackerModel(NamedTuple):
@@ -60,7 +57,6 @@ class VehicleTracker:
         momentum = vehicle.momentum_along_z() * vehicle.rotors.max_speed
         observing = observer_of(observer, vehicle, interval_s)
         self.inertia = observing.inertia
-        self._interval_s = interval_s
         self.model = packed(TrackerModel(momentum, observing, mass_model(mass, vehicle, interval_s)))
         self._rotors = packed(RotorModel(self.lag, self.allocation, vehicle.rotors.max_speed))
         self._actuated = (4, max(vehicle.rotors.count, _WRENCH))
@@ -70,12 +66,11 @@ class VehicleTracker:
         rotors[1, :count] = rotor_speed / self.vehicle.rotors.max_speed
         rotors[2:, :_WRENCH] = matvec(self.allocation, rotors[1, :count] * rotors[1, :count])
         learned = LEARNED if self.vehicle.drag and self.vehicle.drag.learned else 0
-        return Tracked(rotors, None, np.zeros(ESTIMATES + learned), 0.0, self.vehicle.body.mass_kg)
+        return Tracked(rotors, np.empty(0), np.zeros(ESTIMATES + learned), 0.0, self.vehicle.body.mass_kg)
 
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state."""
-        measured, estimate, mass_kg, max_speed, current_a, _, _, _ = observed
+        measured, estimate, mass_kg, charge_ah, max_speed = observed
         rotors = np.empty(self._actuated)
         rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
-        charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
         return rotors[0, : squared.size], Tracked(rotors, measured, estimate, charge_ah, mass_kg)

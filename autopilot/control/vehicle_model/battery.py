@@ -82,7 +82,7 @@ def open_voltage_v(battery: Battery | BatteryNumbers, charge_ah: float) -> float
     return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
 
 
-open_voltage_now = compiled(open_voltage_v)
+open_voltage_now, charged_now = compiled(open_voltage_v), compiled(charged)
 
 
 @compiled

@@ -29,8 +29,10 @@ _JUMP = 3.0  # largest error of a factor in one sample: more is a jump of the me
 _LEAST_FACTOR, _MOST_FACTOR = 0.4, 2.5
 
 
+@compiled
 def with_learned(airframe: Airframe, mass_kg: float, learned: Array) -> Airframe:
-    across, along = (mass_kg / airframe.mass_kg * (1.0 + learned[part]) for part in (_ACROSS, _ALONG))
+    across = mass_kg / airframe.mass_kg * (1.0 + learned[_ACROSS])
+    along = mass_kg / airframe.mass_kg * (1.0 + learned[_ALONG])
     return Airframe(
         mass_kg, airframe.gravity_m_s2, across * airframe.drag_xy, along * airframe.drag_z, across * airframe.rotor_drag
     )
