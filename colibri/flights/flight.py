@@ -155,11 +155,12 @@ class InMemory:
 
     def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
         time_us, controls, armed = command
-        if controls != self._controls[0]:  # else repeated, as between two control samples
-            received = command_as_received(command)
-            assert received is not None, "a control law's command is one that rotors can follow"
-            self._controls = (controls, received.controls)
-        return ActuatorCommand(time_us, self._controls[1], armed)
+        if controls == self._controls[0]:  # repeated, as between two control samples
+            return ActuatorCommand(time_us, self._controls[1], armed)
+        received = command_as_received(command)
+        assert received is not None, "a control law's command is one that rotors can follow"
+        self._controls = (controls, received.controls)
+        return received
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
         return datagrams

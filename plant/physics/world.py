@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.common.compiled_rotations import QUATERNION, VECTOR, earth_from_body
-from colibri.common.jit import compiled_for, packed
+from colibri.common.compiled_rotations import earth_from_body
+from colibri.common.jit import packed
 from colibri.common.matrices import inverse
-from colibri.common.types import Array, PerRotor, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.random_streams import Noise
@@ -91,14 +91,14 @@ class Physics:
         if not is_finite:
             when = f"at t = {time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
-        end = x.tolist()
-        state, eddies = tuple(end[:_RIGID]), None
+        end = tuple(x.tolist())
+        state, eddies = end[:_RIGID], None
         voltage_v = nan if self._battery is None else voltage_v
         time_us += duration_us
         if wind is None:
             velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
             wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
-        after = World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
+        after = World(time_us, state, end[ROTORS], end[CHARGE], voltage_v, wind, eddies)
         self._end = (after, x)
         return after
 
@@ -219,11 +219,6 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
 
 
 def state_frame(world: World) -> StateFrame:
-    return StateFrame(world.time_us, *_motion(world.state))
-
-
-@compiled_for(f"Tuple(({VECTOR}, {VECTOR}, {QUATERNION}, {VECTOR}))(UniTuple(float64, {_RIGID}))")
-def _motion(state: State) -> tuple[Vector, Vector, Quaternion, Vector]:
-    u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = state
+    u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = world.state
     attitude = (qw, qx, qy, qz)
-    return (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r)
+    return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))

@@ -41,39 +41,29 @@ class StepTransition(NamedTuple):
     V: Array  # derivative of velocity by rotation
     W: Array  # derivative of rotation by rotation
     G: Array  # derivative of rates by rates
-    VW: Array  # products, as those below
-    VG: Array
-    WW: Array
-    WG: Array
-    GG: Array
 
 
 def empty_transition(steps: int, rotors: int) -> StepTransition:
-    nine, driven = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, rotors, steps)) for _ in range(4)]
+    nine, driven = [np.zeros((3, 3, steps)) for _ in range(11)], [np.zeros((3, rotors, steps)) for _ in range(4)]
     return StepTransition._make([*nine[:8], *driven, np.zeros((rotors, steps)), np.zeros((3, steps)), *nine[8:]])
 
 
 @inlined
 def _linearise(motion: Array, speeds: Array, model: Model, out: StepTransition) -> None:
     _differentiate(motion, speeds, model, out)
-    V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
-    _multiply(V, W, VW)
-    _multiply(V, G, VG)
-    _multiply(W, W, WW)
-    _multiply(W, G, WG)
-    _multiply(G, G, GG)
-    h = model.interval_s
+    V, W, G, h = out.V, out.W, out.G, model.interval_s
     for i in range(3):
         for j in range(3):
             unit = 1.0 if i == j else 0.0
             for n in range(W.shape[2]):
-                v, w, g, vw, ww, gg = V[i, j, n], W[i, j, n], G[i, j, n], VW[i, j, n], WW[i, j, n], GG[i, j, n]
-                wg = WG[i, j, n]
+                v, w, g = V[i, j, n], W[i, j, n], G[i, j, n]
+                vw, vg, ww = _product(V, W, i, j, n), _product(V, G, i, j, n), _product(W, W, i, j, n)
+                wg, gg = _product(W, G, i, j, n), _product(G, G, i, j, n)
                 out.rotation[i, j, n] = unit + h * (w + 0.5 * h * ww)
                 out.rotation_rate[i, j, n] = h * (unit + 0.5 * h * (w + g) + h * h / 6.0 * (ww + wg + gg))
                 out.rate[i, j, n] = unit + h * (g + 0.5 * h * gg)
                 out.velocity_rotation[i, j, n] = h * (v + 0.5 * h * vw)
-                out.velocity_rate[i, j, n] = 0.5 * h * h * (v + h / 3.0 * (vw + VG[i, j, n]))
+                out.velocity_rate[i, j, n] = 0.5 * h * h * (v + h / 3.0 * (vw + vg))
                 out.position_rotation[i, j, n] = 0.5 * h * h * (v + h / 3.0 * vw)
                 out.position_rate[i, j, n] = h * h * h / 6.0 * v
     _drive(model, out)
@@ -112,11 +102,9 @@ def _differentiate(motion: Array, speeds: Array, model: Model, out: StepTransiti
 
 
 @inlined
-def _multiply(A: Array, B: Array, product: Array) -> None:
-    for i in range(3):
-        for j in range(3):
-            for n in range(product.shape[2]):
-                product[i, j, n] = 0.0 + A[i, 0, n] * B[0, j, n] + A[i, 1, n] * B[1, j, n] + A[i, 2, n] * B[2, j, n]
+def _product(A: Array, B: Array, i: int, j: int, n: int) -> float:
+    total: float = 0.0 + A[i, 0, n] * B[0, j, n] + A[i, 1, n] * B[1, j, n] + A[i, 2, n] * B[2, j, n]
+    return total
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import ceil, nan, radians
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import msgspec
 import numpy as np
@@ -33,7 +33,7 @@ from colibri.autopilot.control.parts.level import levelled, seen_level
 from colibri.autopilot.control.parts.recovery import RecoverySettings, TurnGains, mix_with_priority, turning_moment
 from colibri.autopilot.control.parts.riccati import gains
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
-from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, VehicleTracker
+from colibri.autopilot.control.parts.vehicle_tracking import Tracked, VehicleTracker
 from colibri.autopilot.control.scaling import scaled
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, ObserverSettings
@@ -95,6 +95,10 @@ class LawMemory(NamedTuple):
     age: int  # samples since that plan
     lag_us: int  # of path time behind the clock
     deviation: Deviation | None = None
+
+
+_Seen: TypeAlias = tuple[VehicleState, Tracked, float]
+"""State now, in the level frame; what is tracked, with the rotors of a sample ago; largest speed now, see `actuate`."""
 
 
 class LpvMpc(AttitudeController[LawMemory]):
@@ -187,40 +191,39 @@ class LpvMpc(AttitudeController[LawMemory]):
     ) -> tuple[LawMemory, Decision]:
         del time_us
         if not self._force.upright:
-            state, observed = self._observe(memory, state)
+            seen = self._observe(memory, state)
             wanted = self._targets.within_thrust(self._now, references, memory.deviation)
-            return self._decide(memory, state, observed, wanted, self._mpc.on_clock)
-        state, seen = self._seen(memory, state)
+            return self._decide(memory, seen, wanted, self._mpc.on_clock)
+        state, inputs = self._inputs(memory, state)
         p, v, a, _, _, yaw, _, _ = references
         last, targets, qps = memory.plan.commands if memory.plan else _UNKNOWN, self._targets, self._mpc.on_clock
-        begun, aim = planning.begin_by_clock(p, v, a, yaw, targets.law, targets.record, qps.kind, last, *seen)
-        observed, wanted = Observed(seen[-2], seen[-1], *begun), Wanted(targets.record, aim)
-        return self._decide(memory, state, observed, wanted, qps, condensed=True)
+        begun, aim = planning.begin_by_clock(p, v, a, yaw, targets.law, targets.record, qps.kind, last, *inputs)
+        return self._decide(memory, _seen(state, inputs, begun), Wanted(targets.record, aim), qps, condensed=True)
 
     def step_on_path(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        state, observed = self._observe(memory, state)
+        seen = self._observe(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
         wanted = self._targets.on_path(self._now, self._opened_now(), references, last, memory.lag_us * 1e-6)
-        return self._decide(memory, state, observed, wanted, self._mpc.on_path)
+        return self._decide(memory, seen, wanted, self._mpc.on_path)
 
     def step_attitude(
         self, memory: LawMemory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[LawMemory, Decision]:
         del time_us
-        state, observed = self._observe(memory, state)
+        seen = self._observe(memory, state)
         wanted = self._targets.of_demand(self._now, self._opened_now(), demand)
-        return self._decide(memory, state, observed, wanted, self._mpc.on_hold)
+        return self._decide(memory, seen, wanted, self._mpc.on_hold)
 
-    def _observe(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, Observed]:
-        """Observe the vehicle, and fill the start of a plan; return the state in the level frame, too."""
-        state, seen = self._seen(memory, state)
-        return state, Observed(seen[-2], seen[-1], *planning.begin(*seen))
+    def _observe(self, memory: LawMemory, state: VehicleState) -> _Seen:
+        """Observe the vehicle, and fill the start of a plan."""
+        state, inputs = self._inputs(memory, state)
+        return _seen(state, inputs, planning.begin(*inputs))
 
-    def _seen(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, tuple[Any, ...]]:
+    def _inputs(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, tuple[Any, ...]]:
         """Return the state in the level frame, and the arguments of `planning.begin`."""
         (rotors, before, estimate, charge_ah, mass_kg), plan, age, _, _ = memory
         if self._to_body is not None:
@@ -236,23 +239,16 @@ class LpvMpc(AttitudeController[LawMemory]):
         return self._arrays._replace(force=self._force._replace(max_n=self._now["force"]["max_n"].item()))
 
     def _decide(
-        self,
-        memory: LawMemory,
-        state: VehicleState,
-        observed: Observed,
-        wanted: Wanted,
-        qps: Qps,
-        *,
-        condensed: bool = False,
+        self, memory: LawMemory, seen: _Seen, wanted: Wanted, qps: Qps, *, condensed: bool = False
     ) -> tuple[LawMemory, Decision]:
         """Decide by a plan, or without one by a fallback; the QP is `condensed` unless recovery may be needed."""
-        (tracked, before, age, lag_us, _), (target, aim, path, deviation) = memory, wanted
+        (state, tracked, max_speed), (target, aim, path, deviation) = seen, wanted
+        _, before, age, lag_us, _ = memory
         along_n, force_n, phi, theta, psi = aim
-        yaw = state.euler[2]
-        mass_kg, path_lag_s = observed.mass_kg, lag_us * 1e-6 if path else nan
+        yaw, mass_kg, path_lag_s = state.euler[2], tracked.mass_kg, lag_us * 1e-6 if path else nan
         plan: Plan | None = None
         turned_away = along_n < RECOVER_BEYOND * force_n
-        recovers = turned_away and not _planned(memory, observed)
+        recovers = turned_away and not _planned(memory, tracked.measured)
         if recovers:
             how = Diagnostics(mass_kg=mass_kg, path_lag_s=path_lag_s)
         else:
@@ -266,10 +262,10 @@ class LpvMpc(AttitudeController[LawMemory]):
             squared, plan, age = before.commands[age], before, age + 1
             how = how._replace(fallback=Fallback.SHIFTED_PLAN)
         else:
-            squared, age, how = self._recover(observed), 0, how._replace(fallback=Fallback.RECOVERY)
-        commands, after = self.tracker.actuate(tracked, observed, squared)
+            squared, age, how = self._recover(tracked.measured), 0, how._replace(fallback=Fallback.RECOVERY)
+        commands, tracked = self.tracker.actuate(tracked, squared, max_speed)
         lag_us = self._lag_us(lag_us, plan, age) if path else 0
-        memory = LawMemory(after, plan, age, lag_us, deviation)
+        memory = LawMemory(tracked, plan, age, lag_us, deviation)
         return memory, Decision(commands, (phi, theta, nearest_turn(psi, yaw)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
@@ -278,18 +274,23 @@ class LpvMpc(AttitudeController[LawMemory]):
         passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])
         return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
 
-    def _recover(self, observed: Observed) -> Array:
+    def _recover(self, measured: Array) -> Array:
         """Return squared speeds that turn the thrust axis to the force the shortest way."""
         force, rates = self._targets.force, self._arrays.rigid[10:]
         rotation = np.array(rotation_matrix(tuple(self._arrays.rigid[6:10].tolist())))
         moments = turning_moment(matvec(rotation.T, force / norm(force)), rates, self.tracker.inertia, self._turn)
-        thrust_n = max(dot(force, observed.measured[6:]), 0.0)
+        thrust_n = max(dot(force, measured[6:]), 0.0)
         squared: Array = mix_with_priority(thrust_n, moments, self._mixing, *self._arrays.limits[0].tolist())
         return squared
 
 
-def _planned(memory: LawMemory, observed: Observed) -> bool:
+def _seen(state: VehicleState, inputs: tuple[Any, ...], begun: tuple[float, float, float]) -> _Seen:
+    charge_ah, mass_kg, max_speed = begun
+    return state, Tracked(inputs[4], inputs[-2], inputs[-1], charge_ah, mass_kg), max_speed
+
+
+def _planned(memory: LawMemory, measured: Array) -> bool:
     if memory.plan is None:
         return False
     planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))
-    return dot(np.array([row[2] for row in planned]), observed.measured[6:]) > _AS_PLANNED
+    return dot(np.array([row[2] for row in planned]), measured[6:]) > _AS_PLANNED

@@ -1,7 +1,7 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
 from math import inf, radians
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import msgspec
 import numpy as np
@@ -65,14 +65,9 @@ class Plan(NamedTuple):
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
-class Corrections(NamedTuple):
-    """Result of the QPs of a plan."""
-
-    status: QpStatus  # of the last QP
-    z: Array | None  # changes of the corrections, (n,)
-    iterations: float  # 0 without a solver
-    slack: float = 0.0  # largest violation of a soft limit, in parts of it
-    binding: tuple[int, int] = (0, 0)  # active soft limits of tilt and of rates
+Corrections: TypeAlias = tuple[QpStatus, Array | None, float, float, tuple[int, int]]
+"""Status of the last QP; changes of the corrections, (n,); iterations, 0 without a solver; largest violation of a soft
+limit, in parts of it; active soft limits of tilt and of rates."""
 
 
 class Qps(NamedTuple):
@@ -188,14 +183,14 @@ class Mpc:
     ) -> tuple[Plan | None, Diagnostics]:
         """Solve the QP and read its plan, None if it is not solved; `psi` is unwrapped."""
         started_s = self._clock()
-        status, z, iterations, slack, soft = self.solve(*qps)
+        status, z, iterations, slack, (tilts, rates) = self.solve(*qps)
         solve_time_s = self._clock() - started_s
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
         commands, states = np.empty(self._commands), np.empty(self._states)
         binding = planning.read(qps.kind, z, psi, commands, states)
-        active = Active(binding, 0, *soft)
+        active = Active(binding, 0, tilts, rates)
         diagnostics = Diagnostics(
             status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )
@@ -216,17 +211,17 @@ class Mpc:
         """
         is_free, is_beyond = planning.minimise(kind, minimum)
         if is_free and not is_beyond:
-            return Corrections(QpStatus.SOLVED, minimum, 0)
+            return QpStatus.SOLVED, minimum, 0, 0.0, (0, 0)
         status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
         if z is None or not (is_beyond or planning.is_beyond(kind, z)):
-            return Corrections(status, z, iterations)
+            return status, z, iterations, 0.0, (0, 0)
         planning.limit(kind)
         status, z, more = self._solver.solve(limited)
         iterations += more
         if z is None:
-            return Corrections(status, z, iterations)
+            return status, z, iterations, 0.0, (0, 0)
         slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
-        return Corrections(status, z[: len(free.f)].copy(), iterations, slack, soft)
+        return status, z[: len(free.f)].copy(), iterations, slack, soft
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

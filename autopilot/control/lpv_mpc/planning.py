@@ -16,13 +16,7 @@ from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.vehicle_model.battery import (
-    charged_now,
-    common_speed,
-    fill_limits,
-    open_voltage_now,
-    terminal,
-)
+from colibri.autopilot.control.vehicle_model.battery import common_speed, drawn_ah, fill_limits, open_voltage, terminal
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ESTIMATES, limit_near_ground, observe
 from colibri.autopilot.control.vehicle_model.drag import with_learned
 from colibri.autopilot.control.vehicle_model.mass import follow_mass
@@ -79,11 +73,11 @@ def begin(
     estimate_before: Array, mass_kg: float, charge_ah: float, airborne: bool, states: Array, age: int, tracker: Packed,
     battery: Packed, now: Packed, vehicle: Packed, measured: Array, estimate: Array,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Observe the vehicle, and fill the start of a plan; return mass, charge a sample later, and largest speed.
+    """Observe the vehicle, and fill the start of a plan; return charge a sample later, mass, and largest speed.
 
     Arguments are those of `VehicleState` and `Tracked`; `before`, and the `states` of the previous plan, are empty at
     first. The power of its speeds, or without them that of the present ones, limits the speeds. Filled are `measured`
-    and `estimate` of `Observed`, `now` except constants, and the `vehicle`'s airframe.
+    and `estimate`, `now` except constants, and the `vehicle`'s airframe.
     """
     start, model = now[0], tracker[0]
     speeds, wrench, mean_wrench = rotors[1, : start.squared.shape[0]], rotors[2], rotors[3]
@@ -113,15 +107,15 @@ def begin(
         start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
     for i in range(speeds.shape[0]):
         start.squared[i] = speeds[i] * speeds[i]
-    open_v, speed = open_voltage_now(battery[0], charge_ah), common_speed(charge_ah, battery)
+    open_v, speed = open_voltage(battery[0], charge_ah), common_speed(charge_ah, battery)
     if states.shape[0] > 0:
         fill_limits(states[age:, PREDICTED:], open_v, battery, start.limits[:, 1])
     else:
         fill_limits(start.squared.copy().reshape((1, -1)), open_v, battery, start.limits[:, 1])
     start.force.max_n = start.span_n * (speed * speed)
     voltage_v, current_a = terminal(open_v, speeds, battery)
-    charge_ah = charged_now(charge_ah, current_a, model.observer.interval_s)
-    return mass_kg, charge_ah, voltage_v / battery[0].full_voltage_v
+    charge_ah = drawn_ah(charge_ah, current_a, model.observer.interval_s)
+    return charge_ah, mass_kg, voltage_v / battery[0].full_voltage_v
 
 
 @compiled

@@ -32,16 +32,6 @@ class Tracked(NamedTuple):
     mass_kg: float
 
 
-class Observed(NamedTuple):
-    """The estimated state of the vehicle now."""
-
-    measured: Array  # of the observer, (9,)
-    estimate: Array  # of the observer, (12,)
-    mass_kg: float
-    charge_ah: float  # a sample later
-    max_speed: float  # available to a rotor while all keep their power, in parts of the largest
-
-
 class TrackerModel(NamedTuple):
     momentum: Array  # of each rotor along body z at top speed, N m s, (m,)
     observer: ObserverModel
@@ -68,9 +58,12 @@ class VehicleTracker:
         learned = LEARNED if self.vehicle.drag and self.vehicle.drag.learned else 0
         return Tracked(rotors, np.empty(0), np.zeros(ESTIMATES + learned), 0.0, self.vehicle.body.mass_kg)
 
-    def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
-        """Return rotor commands, vehicle's unit, and the next tracker state."""
-        measured, estimate, mass_kg, charge_ah, max_speed = observed
+    def actuate(self, tracked: Tracked, squared: Array, max_speed: float) -> tuple[Array, Tracked]:
+        """Return rotor commands, vehicle's unit, and the state with the rotors a sample later.
+
+        `max_speed` is available to a rotor while all keep their power, in parts of the largest.
+        """
+        before, measured, estimate, charge_ah, mass_kg = tracked
         rotors = np.empty(self._actuated)
-        rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
+        rotor_lag.actuate(before, squared, max_speed, self._rotors, rotors)
         return rotors[0, : squared.size], Tracked(rotors, measured, estimate, charge_ah, mass_kg)

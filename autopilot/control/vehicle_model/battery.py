@@ -82,7 +82,7 @@ def open_voltage_v(battery: Battery | BatteryNumbers, charge_ah: float) -> float
     return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
 
 
-open_voltage_now, charged_now = compiled(open_voltage_v), compiled(charged)
+open_voltage, drawn_ah = compiled(open_voltage_v), compiled(charged)
 
 
 @compiled
@@ -99,7 +99,7 @@ def common_speed(charge_ah: float, packed: Packed) -> float:
 def _fill_common(rotors: float, packed: Packed) -> None:
     battery = packed[0]
     for step in range(_INTERVALS + 1):
-        open_v = open_voltage_now(battery, battery.capacity_ah / _INTERVALS * step)
+        open_v = open_voltage(battery, battery.capacity_ah / _INTERVALS * step)
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
