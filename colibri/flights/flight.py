@@ -114,7 +114,8 @@ class InMemory:
         rotors: int = ROTORS,
     ) -> None:
         self._traffic = traffic
-        self._replayed = replayed
+        self._encodes = replayed and feedback is Feedback.SENSORS
+        self._uncounted = 0  # frames since the last one that both ends have counted
         self._controls: tuple[PerRotor, PerRotor] = ((), ())  # of the last command, as sent and as received
         self.plant_end = PlantEnd(
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
@@ -133,18 +134,18 @@ class InMemory:
             received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)
         if received is not None:
             step = autopilot.step(received)
-            self.autopilot_end.follow(now_us, encoded=bool(step.faults))
             if not step.faults:
-                command = self._as_received(step.command)
-                if self._replayed and isinstance(frame, SensorFrame):
+                self._uncounted += 1
+                if self._encodes and isinstance(frame, SensorFrame):
                     datagram = self.plant_end.encoded(frame)
-                else:
-                    self.plant_end.skip()
-                return step, command, (), datagram
+                return step, self._as_received(step.command), (), datagram
+            self._count(now_us)
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()
             self.autopilot_end.answer(step.command, step.faults)
         else:
+            if self._uncounted:
+                self._count(now_us - plant.interval_us)
             self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
             answered, datagram = self._to_autopilot(now_us, autopilot)
             assert answered is not None, "the autopilot answers every new frame"
@@ -152,6 +153,13 @@ class InMemory:
         awaited = self._to_plant(now_us)
         assert awaited is not None, "the answer names the frame awaited"
         return step, awaited, self.plant_end.take_faults(), datagram
+
+    def _count(self, time_us: int) -> None:
+        """Count the frames up to one that came without a datagram."""
+        self.autopilot_end.follow(time_us, self._uncounted)
+        if not self._encodes:
+            self.plant_end.skip(self._uncounted)
+        self._uncounted = 0
 
     def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
         time_us, controls, armed = command

@@ -72,11 +72,10 @@ class AutopilotEnd(AnsweringEnd):
         following = self._next(frame, now_s)
         return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
-    def follow(self, time_us: int, *, encoded: bool) -> None:
-        """Go on from a frame that came without a datagram; count an answer that is not `encoded`, too."""
+    def follow(self, time_us: int, answers: int) -> None:
+        """Go on from a frame that came without a datagram, after so many answers without one."""
         self._time_us = time_us
-        if not encoded:
-            self._codec.skip(1)
+        self._codec.skip(answers)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         answer = encode_actuators(self._codec, command)

@@ -128,9 +128,9 @@ class PlantEnd:
             self._receive_fault(message, answered=command is not None)
         return command
 
-    def skip(self) -> None:
-        """Count a frame that was not encoded, for the numbers of later ones."""
-        self._codec.skip(self._messages)
+    def skip(self, frames: int) -> None:
+        """Count frames that were not encoded, for the numbers of later ones."""
+        self._codec.skip(frames * self._messages)
 
     def encoded(self, frame: SensorFrame) -> bytes:
         return b"".join(encode_sensors(self._codec, frame))

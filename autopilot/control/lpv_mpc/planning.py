@@ -309,10 +309,12 @@ def _read_states(
     """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
     inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
     for step in range(motion.shape[0]):
-        x, X, state = motion[step], responses[step], states[step]
+        x, X, state, blocks = motion[step], responses[step], states[step], levels.shape[0]
+        while blocks > 0 and levels[blocks - 1, step] == 0.0:  # not begun
+            blocks -= 1
         for part in range(0, DEVIATIONS, 4):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for block in range(levels.shape[0]):
+            for block in range(blocks):
                 for k in range(inputs * block, inputs * block + speeds.shape[1]):  # four sums: none waits for another
                     a += X[part, k] * z[k]
                     b += X[part + 1, k] * z[k]
@@ -337,7 +339,7 @@ def _read_states(
             state[9 + i] = x[10 + i] + change[RATE + i]
         for rotor in range(speeds.shape[1]):
             state[12 + rotor] = speeds[step, rotor]
-            for block in range(levels.shape[0]):
+            for block in range(blocks):
                 state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
 
 
