@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_ARMED = True  # a keyword argument would take twice as long
 
 
 def track_autopilot(
@@ -117,7 +116,7 @@ class TrackStages:
         return None
 
     def actuate(self, now_us: int) -> ActuatorCommand:
-        return ActuatorCommand(now_us, self.loop.controls, _ARMED)
+        return ActuatorCommand(now_us, self.loop.controls, True)
 
     def faults(self) -> tuple[Fault | WorldChange, ...]:
         return ()

@@ -189,8 +189,7 @@ class Mpc:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
         commands, states = np.empty(self._commands), np.empty(self._states)
-        binding = planning.read(qps.kind, z, psi, commands, states)
-        active = Active(binding, 0, tilts, rates)
+        active = Active(planning.read(qps.kind, z, psi, commands, states), 0, tilts, rates)
         diagnostics = Diagnostics(
             status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )

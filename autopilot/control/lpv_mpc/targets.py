@@ -45,6 +45,7 @@ class TargetBuilder:
         self.force = target.force  # of the last target
         self._near = (target.position, target.velocity, target.acceleration)
         self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
+        self._of_end = Flat(np.empty((3, 3)), np.empty((3, 3, 3)), np.empty((1, 3)), np.empty((2, rotors)))
 
     def within_thrust(self, now: Packed, references: Horizon, deviation: Deviation | None) -> Wanted:
         """Return the target of references by the clock, or near those beyond the largest thrust."""
@@ -75,7 +76,7 @@ class TargetBuilder:
         if not guidance.turns:
             feed_forward.go_on_turning(now.rigid, h, nominal[3])
             steady[3][:], ending[3][:] = nominal[3], nominal[3][-3:]
-        near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
+        near, flat, last_flat, target = self._near, self._flat, self._of_end, self._target
         feasible = feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
         stop_s = stopping_s(now.disturbance, mpc.model)
         approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, stop_s, self.law, near)
@@ -111,10 +112,6 @@ class TargetBuilder:
         target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
         target.force[:] = flat.forces[0]
         return Wanted(self.record, feed_forward.aim(record, self.record))
-
-    def _flat_of(self, n: int) -> Flat:
-        rotors = len(self._mpc.from_wrench)
-        return Flat(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n - 2, 3)), np.empty((n - 1, rotors)))
 
 
 def _motion(samples: int) -> tuple[Array, Array, Array]:

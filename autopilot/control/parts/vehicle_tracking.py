@@ -59,10 +59,7 @@ class VehicleTracker:
         return Tracked(rotors, np.empty(0), np.zeros(ESTIMATES + learned), 0.0, self.vehicle.body.mass_kg)
 
     def actuate(self, tracked: Tracked, squared: Array, max_speed: float) -> tuple[Array, Tracked]:
-        """Return rotor commands, vehicle's unit, and the state with the rotors a sample later.
-
-        `max_speed` is available to a rotor while all keep their power, in parts of the largest.
-        """
+        """Return rotor commands, vehicle's unit, and the next tracker state; `max_speed` in parts of the largest."""
         before, measured, estimate, charge_ah, mass_kg = tracked
         rotors = np.empty(self._actuated)
         rotor_lag.actuate(before, squared, max_speed, self._rotors, rotors)
