@@ -1,7 +1,7 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
 from itertools import starmap
@@ -49,14 +49,14 @@ class TopicLog:
 
     def __init__(self, append: Callable[[bytes], object]) -> None:
         self.append = append
-        self._waiting: defaultdict[RowEncoder, list[tuple[float, ...]]] = defaultdict(list)
+        self._waiting: defaultdict[RowEncoder, list[Sequence[float]]] = defaultdict(list)
         self._queued: list[bytes] = []
         self._beginning = b""
 
     def begin(self, beginning: bytes) -> None:
         self._beginning = beginning
 
-    def add(self, encoder: RowEncoder, row: tuple[float, ...]) -> None:
+    def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
         waiting = self._waiting[encoder]
         waiting.append(row)
         if len(waiting) >= encoder.block_rows:
