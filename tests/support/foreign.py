@@ -2,8 +2,6 @@
 
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -46,11 +44,3 @@ TRACK = Package("their_track", "colibri.tracks", ("helix = Helix",))
 def example(page: str) -> str:
     code, *_ = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
     return str(code)
-
-
-def fly_as_a_user(package: Package, source: str, folder: Path, *words: str) -> None:
-    """Fly with an installed package in a process of its own, into `out` of a folder; it must end well and silently."""
-    environment = {**os.environ, "PYTHONPATH": package.install(folder, source)}
-    command = [sys.executable, "-m", "colibri", "fly", *words, "--quiet", "--no-figures", "--out", str(folder / "out")]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")

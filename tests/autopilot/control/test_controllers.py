@@ -19,7 +19,7 @@ from colibri.autopilot.control.registry import (
 from colibri.autopilot.control.settings import present_name
 from colibri.common.config import SettingsError
 from colibri.plant.vehicle.description import load_vehicle
-from tests.support.foreign import LAW, FlyTheirs, example, fly_as_a_user
+from tests.support.foreign import FlyTheirs, example
 from tests.support.states import staying, turned
 from tools.harness.processes import fly
 
@@ -84,9 +84,9 @@ THEIRS = ("spiral", "--controller", "their-name", "--link")
 
 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
-def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
+def test_the_example_of_the_docs_flies(fly_theirs: FlyTheirs, tmp_path: Path, link: str) -> None:
     assert len(EXAMPLE.splitlines()) <= 36
-    fly_as_a_user(LAW, EXAMPLE, tmp_path, *THEIRS, link, "--duration", "25")
+    assert fly_theirs(EXAMPLE, *THEIRS, link, "--duration", "25") == (0, "")
     figures = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert figures["controller"] == "their-name"
     assert figures["rmse_after_20s_m"] < 0.5

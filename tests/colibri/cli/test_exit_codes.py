@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -50,9 +51,14 @@ def test_a_stopped_process_holds_up_neither_signal_nor_end(tmp_path: Path, name:
     wait_for(lambda: held.status() == psutil.STATUS_STOPPED, "the process to stop")
     flight.kill() if name == "plant" else flight.terminate()
     began_s = monotonic()
-    wait_for(lambda: not held.is_running() or held.status() == psutil.STATUS_ZOMBIE, "the stopped process to end")
+    for each in children:
+        wait_for(partial(_has_ended, each), f"{each} to end")
     assert monotonic() < began_s + 4.0
     assert (flight.wait(), flight.communicate()[1].count("\n")) == ((-9, 0) if name == "plant" else (143, 1))
+
+
+def _has_ended(process: psutil.Process) -> bool:
+    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
 
 
 def full_pipe() -> tuple[int, int]:

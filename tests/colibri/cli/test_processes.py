@@ -69,16 +69,6 @@ def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str)
     assert not any(child.is_running() for child in children)
 
 
-def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
-    flight, children = flying(tmp_path)
-    flight.kill()
-    flight.communicate()
-    wait_for(
-        lambda: not any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children),
-        "both processes to end",
-    )
-
-
 def test_forked_processes_fly_the_same() -> None:
     command = [sys.executable, "-P", "-u", "-c", FORKING]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)

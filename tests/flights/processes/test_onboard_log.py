@@ -4,8 +4,8 @@ import socket
 from contextlib import closing, suppress
 from io import BytesIO
 from math import nan
+from pathlib import Path
 from time import monotonic
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -21,16 +21,6 @@ from tools.harness.processes import vehicle
 pytestmark = pytest.mark.usefixtures("forked")
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
-
-
-class Flown(NamedTuple):
-    """A flight of `colibri sitl`, over: what was downloaded of it, what was said, and the logs on disk."""
-
-    content: bytes
-    log: ULog
-    texts: list[str]
-    kept: bytes
-    beside: ULog
 
 
 def downloaded(port: int) -> bytes:
@@ -56,14 +46,12 @@ def downloaded(port: int) -> bytes:
     return log.data
 
 
-@pytest.fixture(scope="module", params=["state", pytest.param("sensors", marks=pytest.mark.long)])
-def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    folder = tmp_path_factory.mktemp("flown")
-    out = folder / "out"
-    with vehicle(folder, "--out", str(out), "--feedback", request.param, speed=4.0) as flying:
-        if request.param == "sensors":
-            flying.seen.wait(lambda sight: sight.time_s > 8.0, "an estimate")
+@pytest.mark.parametrize("feedback", ["state", pytest.param("sensors", marks=pytest.mark.long)])
+def test_a_download_is_the_file_on_disk(tmp_path: Path, feedback: str) -> None:
+    with vehicle(tmp_path, "--out", str(tmp_path / "out"), "--feedback", feedback, speed=4.0) as flying:
         seen = flying.seen
+        if feedback == "sensors":
+            seen.wait(lambda sight: sight.time_s > 8.0, "an estimate")
         assert seen.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, 2.0) == ACCEPTED
         assert seen.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
         seen.wait(lambda sight: sight.armed and sight.mode is Mode.HOLD, "the height")
@@ -71,17 +59,25 @@ def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         seen.wait_until_disarmed()
         content = downloaded(flying.port)
         (kept,) = (flying.state / "0" / "logs").glob("00001.ulg")
-        kept_bytes, texts = kept.read_bytes(), seen.texts
-    beside = ULog(str(out / "0" / "flight.ulg"))  # whole once the process has ended
-    return Flown(content, ULog(BytesIO(content)), texts, kept_bytes, beside)
+        assert content == kept.read_bytes()
+    log = ULog(BytesIO(content))
+    beside = ULog(str(tmp_path / "out" / "0" / "flight.ulg"))  # whole once the process has ended
+    assert not log.file_corruption
+    _has_the_numbers_of(log, beside)
+    said, said_beside = ([line.message for line in each.logged_messages] for each in (log, beside))
+    assert "Disarmed by landing" in said
+    assert set(said) <= set(seen.texts) <= set(said_beside)
+    assert [text for text in said_beside if text in said] == said
+    battery = log.get_dataset("battery_status").data
+    assert 10.0 < battery["voltage_v"][-1] < 13.0
+    assert 0.9 < battery["remaining"][-1] < battery["remaining"][0] <= 1.0
+    arming = log.get_dataset("vehicle_status").data["arming_state"].tolist()
+    assert arming == [1, *[2] * (len(arming) - 2), 1]
+    assert log.initial_parameters["MPC_XY_CRUISE"] > 0.0
 
 
-def test_a_download_is_the_file_on_disk(flown: Flown) -> None:
-    assert flown.content == flown.kept
-    assert not flown.log.file_corruption
-
-
-def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None:
+def _has_the_numbers_of(log: ULog, beside: ULog) -> None:
+    """Compare with the log that has all samples."""
     for topic, names in {
         "vehicle_attitude": "q[0] q[1] q[2] q[3]",
         "vehicle_local_position": "x y z vx vy vz",
@@ -90,26 +86,8 @@ def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None
         "trajectory_setpoint": "position[2] velocity[2]",
         "mpc_status": "cost iterations solve_time_us qp_status",
     }.items():
-        few, all_of_them = flown.log.get_dataset(topic).data, flown.beside.get_dataset(topic).data
+        few, all_of_them = log.get_dataset(topic).data, beside.get_dataset(topic).data
         assert set(np.diff(few["timestamp"])) == {40_000}
         at = np.searchsorted(all_of_them["timestamp"], few["timestamp"])
         for name in names.split():
             assert np.array_equal(few[name], all_of_them[name][at], equal_nan=True), (topic, name)
-
-
-def test_both_logs_have_the_status_texts(flown: Flown) -> None:
-    said = [line.message for line in flown.log.logged_messages]
-    assert "Disarmed by landing" in said
-    assert set(said) <= set(flown.texts)
-    beside = [line.message for line in flown.beside.logged_messages]
-    assert [text for text in beside if text in said] == said
-    assert set(flown.texts) <= set(beside)
-
-
-def test_it_has_the_battery_the_status_and_the_parameters(flown: Flown) -> None:
-    battery = flown.log.get_dataset("battery_status").data
-    assert 10.0 < battery["voltage_v"][-1] < 13.0
-    assert 0.9 < battery["remaining"][-1] < battery["remaining"][0] <= 1.0
-    arming = flown.log.get_dataset("vehicle_status").data["arming_state"].tolist()
-    assert arming == [1, *[2] * (len(arming) - 2), 1]
-    assert flown.log.initial_parameters["MPC_XY_CRUISE"] > 0.0

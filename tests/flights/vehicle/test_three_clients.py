@@ -11,8 +11,8 @@ from tools.soak.clients import HarnessStation, crew, faults
 
 pytestmark = QUICK
 
-LASTS_S = 20.0
-WARM_S = 8.0
+LASTS_S = 14.0
+WARM_S = 6.0
 MAX_NEW_OBJECTS = 100
 
 

@@ -96,6 +96,9 @@ class Px4:
         return self._codec.encode("HIL_ACTUATOR_CONTROLS", self.time_us, controls, mode, self._flags)
 
 
+FLOWN_S = 6.0
+
+
 def serve(px4: Px4, link: GroundLink, until: Callable[[], bool], what: str) -> None:
     give_up_s = monotonic() + GIVE_UP_AFTER_S
     while not until():
@@ -277,7 +280,7 @@ def flown(px4: Px4, link: GroundLink) -> None:
     assert px4.known is not None
     assert px4.known.position_m == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
     px4.armed, px4.target_ned_m = True, (1.0, 0.5, -1.5)
-    serve(px4, link, lambda: px4.time_us > 10_000_000, "the flight")
+    serve(px4, link, lambda: px4.time_us > 1e6 * FLOWN_S, "the flight")
     assert px4.known.position_m == pytest.approx(px4.target_ned_m, abs=0.05)
 
 
@@ -297,20 +300,20 @@ def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
             wait_for(partial(_has_gone, process, number), "the plant to notice")
             times = [message.fields.time_usec for message in px4.messages if message.name == "HIL_SENSOR"]
             assert set(np.diff(times)) == {FRAME_US}
-            assert len(px4.fixes) == pytest.approx(10 * 20, abs=10)
+            assert len(px4.fixes) == pytest.approx(20 * FLOWN_S, abs=10)
         assert process.events("gone")[1]["text"].endswith(f"; waiting for PX4 on {url.replace('tcp', 'tcpin')}")
         process.process.terminate()
         assert process.wait() == 143
     for name in ("flight-1.ulg", "flight.ulg"):  # a flight has a file of its own
         flown_s = topic_rows(tmp_path / "out" / name)["t"]
-        assert (flown_s[0], flown_s[-1]) == (0.004, pytest.approx(10.0, abs=0.1))
+        assert (flown_s[0], flown_s[-1]) == (0.004, pytest.approx(FLOWN_S, abs=0.1))
         assert set(np.diff(np.round(flown_s * 1e6))) == {FRAME_US}
     for name in ("flight-1.tlog", "flight.tlog"):
         logged = list(decode((tmp_path / "out" / name).read_bytes()))
         assert np.diff([each.time_us for each in logged]).min() >= 0
         names = [message.name for each in logged for message in Codec(1, 1).decode(each.frame)]
         assert {"COMMAND_LONG", "HEARTBEAT"} <= set(names[: names.index("HIL_ACTUATOR_CONTROLS")])
-        assert names.count("HIL_SENSOR") == pytest.approx(10 * 250, abs=25)
+        assert names.count("HIL_SENSOR") == pytest.approx(250 * FLOWN_S, abs=25)
     assert len(list((tmp_path / "out").iterdir())) == 4
 
 

@@ -10,7 +10,7 @@ from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
-from tests.support.foreign import TRACK, FlyTheirs, example, fly_as_a_user
+from tests.support.foreign import FlyTheirs, example
 from tests.support.refusals import refusal_of
 
 
@@ -139,8 +139,8 @@ def test_rounded_samples_are_noticed(tmp_path: Path, digits: int, said: bool) ->
 EXAMPLE = example("tracks.md")
 
 
-def test_the_example_of_the_docs_flies(tmp_path: Path) -> None:
-    fly_as_a_user(TRACK, EXAMPLE, tmp_path, "helix:radius=3,climb=0.2", "--duration", "4")
+def test_the_example_of_the_docs_flies(fly_theirs: FlyTheirs, tmp_path: Path) -> None:
+    assert fly_theirs(EXAMPLE, "helix:radius=3,climb=0.2", "--duration", "4") == (0, "")
     rows = np.genfromtxt(tmp_path / "out" / "flight.csv", delimiter=",", names=True)
     assert np.hypot(rows["x_ref"], rows["y_ref"]) == pytest.approx(3.0)
     assert rows["z_ref"] == pytest.approx(1.0 + 0.2 * rows["t"])
