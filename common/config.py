@@ -1,6 +1,8 @@
 """Strict tables for vehicle files, profiles and control laws."""
 
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path, PurePath
 from typing import Annotated, Any, TypeAlias, TypeVar
@@ -34,9 +36,8 @@ def read_named(what: str, folder: Path, name_or_path: str | PurePath, kind: type
     """Read the TOML file of that name in `folder`, or at a path that ends in `.toml`."""
     checked(what, name_or_path, (str, PurePath), f"a name, a .toml file or a {what.capitalize()}", error)
     name_or_path = str(name_or_path)
-    if name_or_path.endswith(".toml"):
-        return read_toml(Path(name_or_path), kind, error)
-    return read_toml(_named(what, folder, name_or_path, error), kind, error)
+    is_path = name_or_path.endswith(".toml")
+    return read_toml(Path(name_or_path) if is_path else _named(what, folder, name_or_path, error), kind, error)
 
 
 def named_text(what: str, folder: Path, name: str, error: type[Error]) -> str:
@@ -53,7 +54,7 @@ def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     """Read a strict structure; `error` names file and key of what is missing, unknown or invalid."""
     try:
-        return msgspec.toml.decode(read_bytes(path), type=kind)
+        return msgspec.convert(deepcopy(_parsed(read_bytes(path))), kind)
     except OSError as reason:
         raise error(f"{path}: {reason.strerror}") from reason
     except msgspec.ValidationError as reason:
@@ -63,6 +64,11 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
         raise error(f"{path}: line {line}: is not UTF-8: save the file as that") from reason
     except UNREADABLE as reason:
         raise error(f"{path}: {reason}") from reason
+
+
+@lru_cache(maxsize=32)
+def _parsed(content: bytes) -> Any:
+    return msgspec.toml.decode(content)  # takes milliseconds, and every flight reads the same files
 
 
 def _choices(kind: Any, key: str) -> str:

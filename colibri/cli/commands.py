@@ -149,27 +149,28 @@ class _Grouped(RawDescriptionHelpFormatter):
 
 
 def parser_for(given: Sequence[str]) -> ArgumentParser:
-    asked = next((word for word in given if word in COMMANDS), None)
-    return parser_of(*(name for name in COMMANDS if name == asked))
+    """Return the parser of a command line: quickly, if it begins with a subcommand."""
+    return parser_of(given[0], alone=True) if given and given[0] in COMMANDS else parser_of()
 
 
-def parser_of(*whole: str) -> ArgumentParser:
-    """Return the parser with the options of some subcommands."""
+def parser_of(*whole: str, alone: bool = False) -> ArgumentParser:
+    """Return the parser with the options of some subcommands, and without the other subcommands if `alone`."""
     parser = ArgumentParser(
         prog="colibri",
         description="A quadrotor autopilot in pure Python, flown over MAVLink.",
-        epilog=_listed(),
+        epilog="" if alone else _listed(),
         formatter_class=_Grouped,
     )
     parser.add_argument("--version", action=Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of the commands below")
-    for name, command in COMMANDS.items():
-        examples = f"examples:\n{indent(command.examples, '  ')}"
-        options = commands.add_parser(name, help=command.does, description=command.does, epilog=examples)
+    for name in whole if alone else COMMANDS:
+        does = COMMANDS[name].does
+        examples = f"examples:\n{indent(COMMANDS[name].examples, '  ')}"
+        options = commands.add_parser(name, help=does, description=does, epilog=examples)
         options.formatter_class = RawDescriptionHelpFormatter
         if name in whole:
             add_options(name, options)
-    for name, does in PROCESSES.items():
+    for name, does in () if alone else PROCESSES.items():
         commands.add_parser(name, help=does, add_help=False)
     return parser
 
