@@ -104,7 +104,7 @@ class TrackStages:
         references = self._planner.horizon_at(acts_us - loop.lag_us, loop.control_interval_us)
         sinks = is_below(references.position_enu_m.item(2), state)
         self._landing, _ = watch(self._landing, now_us, state, sinks)
-        return Guidance(references, pace=Pace.CATCHING_UP)
+        return Guidance(references, None, False, Pace.CATCHING_UP)
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         assert guidance.horizon is not None, "a track has references at any time"

@@ -16,6 +16,7 @@ from colibri.autopilot.parameters.definitions import definitions
 from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup
 from colibri.common.process.log_files import LogError
 from colibri.common.process.shared_log import SharedLog
+from colibri.common.types import PerRotor
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.hil.state import STATE_BYTES, StateFrame
@@ -63,7 +64,7 @@ class AutopilotLog:
 
         The `datagram` is empty where only the state was sent, and None in a replay.
         """
-        time_us = step.command.time_us
+        (time_us, controls, armed), decision, duration_s, estimate, _, _, delay_us, _, _ = step
         if time_us < self._time_us:
             self.topics.close()
             self._received_bytes = self._said_bytes = 0
@@ -71,18 +72,18 @@ class AutopilotLog:
             self._fallback, self._begins = None, True
         self._time_us = time_us
         if self.topics.for_viewers:
-            self._write_input(step, datagram)
-        if step.estimate is not None and step.estimate.check is not None:
-            self.topics.add(FILTER, self._check_row(step.estimate.check))
-        if step.decision is None:
+            self._write_input(time_us, controls, armed, datagram)
+        if estimate is not None and estimate.check is not None:
+            self.topics.add(FILTER, self._check_row(estimate.check))
+        if decision is None:
             return
-        if step.estimate is not None:
-            self.topics.add(ESTIMATE, _estimate_row(step.estimate))
-        _, reference, how = step.decision
+        if estimate is not None:
+            self.topics.add(ESTIMATE, _estimate_row(estimate))
+        _, reference, how = decision
         status, fallback, solve_time_s, cost, active, slack, _, _, mass_kg, path_lag_s, iterations = how
         decided = (
-            *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6, step.duration_s * 1e6,
-            cost, slack, *active, step.delay_us, mass_kg, path_lag_s, iterations,
+            *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6, duration_s * 1e6,
+            cost, slack, *active, delay_us, mass_kg, path_lag_s, iterations,
         )  # fmt: skip
         self.topics.add(DECISION, (time_us / 1e6, *decided))
         if self._views is not None:
@@ -142,9 +143,8 @@ class AutopilotLog:
     def close(self) -> None:
         self.topics.close()
 
-    def _write_input(self, step: Step, datagram: bytes | None) -> None:
+    def _write_input(self, time_us: int, controls: PerRotor, armed: bool, datagram: bytes | None) -> None:
         """Write the inputs of a replay; frames of states follow from the truth."""
-        time_us, controls, armed = step.command
         if self._begins:
             self._begins = False
             setup = msgspec.structs.replace(self._setup, first_us=time_us)

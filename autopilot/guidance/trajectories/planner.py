@@ -36,8 +36,8 @@ class Planner:
         block, first = divmod(sample if self._rest is None else min(sample, self._rest), self._length)
         if block != self._block:
             self._block, self.table = block, self._tabulate(block)
-        ahead = slice(first, first + self.preview.samples)
-        return Horizon(*[column[ahead] for column in self.table])
+        ahead, (p, v, a, j, s, yaw, yaw_rate, yaw_acc) = slice(first, first + self.preview.samples), self.table
+        return Horizon(p[ahead], v[ahead], a[ahead], j[ahead], s[ahead], yaw[ahead], yaw_rate[ahead], yaw_acc[ahead])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
         """Return a horizon between instants `grid_us` apart, extrapolated from the one before."""
