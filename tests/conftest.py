@@ -3,7 +3,6 @@
 import gc
 import signal
 import threading
-from collections.abc import Iterator
 from importlib import import_module
 
 import pytest
@@ -21,20 +20,13 @@ use_one_thread()  # before numpy is loaded: two workers have a core each
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.fixture(scope="module")
-def forked() -> Iterator[None]:
-    """Have `tools.harness.processes` and `colibri sitl` fork what they start."""
-    forks = import_module("tests.support.forks")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
-        patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
-        yield
-
-
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
     import_module("colibri.analysis.figures")  # with the true can_fork: two processes would copy what is collected
     # Flights over UDP fork, as those of users do, beside the waiting threads of pytest-xdist and jemalloc.
-    pytest.MonkeyPatch().setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
+    patch, forks = pytest.MonkeyPatch(), import_module("tests.support.forks")
+    patch.setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
+    patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
+    patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
     gc.collect()
     freeze_once()

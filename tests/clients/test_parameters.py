@@ -5,11 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from tools.harness.processes import vehicle
-
-pytestmark = pytest.mark.usefixtures("forked")
 
 NAME = "SYS_AUTOCONFIG"
 SIGNALLING = [(-8388607, -4194305), (2139095041, 2143289343)]

@@ -16,8 +16,6 @@ from tests.clients.support.ground_station import GroundStation
 from tools.harness.observer import Sight
 from tools.harness.processes import SitlProcess, vehicle
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 CUSTOM = mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 GROUND_M = DEFAULT_HOME.altitude_m

@@ -24,8 +24,6 @@ from colibri.plant.spec import PlantSpec
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import WAITING, SitlProcess, vehicle, wait_for
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 
 

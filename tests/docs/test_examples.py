@@ -11,8 +11,6 @@ import pytest
 from tests.support.pages import ROOT, run
 from tools.harness.processes import vehicle
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 LINES = 40
 SLOW = {"learn_hover", "mavsdk_takeoff", "test_return"}

@@ -28,6 +28,8 @@ KEPT = "; logs are in {}"
         ("colibri", signal.SIGTERM, 143, "ended by SIGTERM"),
         ("colibri", signal.SIGHUP, 129, "ended by SIGHUP"),
         ("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM"),
+        ("autopilot", signal.SIGKILL, 1, "the autopilot was killed by SIGKILL"),
+        pytest.param("plant", signal.SIGKILL, 1, "the plant was killed by SIGKILL", marks=pytest.mark.long),
         pytest.param("autopilot", signal.SIGHUP, 1, "the autopilot was ended by SIGHUP", marks=pytest.mark.long),
     ],
 )

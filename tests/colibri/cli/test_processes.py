@@ -57,18 +57,6 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path) -> None:
     assert flown[0].startswith("t,u,v,w,p,q,r,x,y,z,phi,theta,psi,U1")
 
 
-@pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
-def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str) -> None:
-    flight, children = flying(tmp_path)
-    (victim,) = (child for child in children if child.name() == name)
-    victim.send_signal(signal.SIGKILL)
-    _, said = flight.communicate(timeout=60.0)
-    assert flight.returncode == 1
-    expected = f"colibri: error: the {name} was killed by SIGKILL; logs are in {tmp_path}"
-    assert said.splitlines()[-1] == expected
-    assert not any(child.is_running() for child in children)
-
-
 def test_forked_processes_fly_the_same() -> None:
     command = [sys.executable, "-P", "-u", "-c", FORKING]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)

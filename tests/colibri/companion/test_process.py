@@ -10,8 +10,6 @@ import pytest
 from tests.support.commands import Refused, exit_code
 from tools.harness.processes import vehicle
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 LINK = "udpin:127.0.0.1:0"
 MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [
 {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397742, 8.545594, 2]},

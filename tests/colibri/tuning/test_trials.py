@@ -1,3 +1,4 @@
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,8 +13,11 @@ def end(trials: Trials, begun: Begun) -> None:
     trials.tell(begun, FinishedTrial(begun.number, (value,), begun.params, 4, 0, False, {}))
 
 
+planned_for = cache(lambda trials: planned(trials=trials))
+
+
 def all_of(folder: Path, trials: int = 14) -> list[FinishedTrial]:
-    with Trials(folder, planned(trials=trials)) as shared:
+    with Trials(folder, planned_for(trials)) as shared:
         while (begun := shared.ask()) is not None:
             end(shared, begun)
         return shared.ended
@@ -22,6 +26,19 @@ def all_of(folder: Path, trials: int = 14) -> list[FinishedTrial]:
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedTrial]:
     return all_of(tmp_path_factory.mktemp("expected"))
+
+
+@pytest.fixture(scope="module")
+def half(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Return the journal of 11 trials, and one that was begun."""
+    folder = tmp_path_factory.mktemp("half")
+    with Trials(folder, planned_for(14)) as shared:
+        for _ in range(11):
+            begun = shared.ask()
+            assert begun is not None
+            end(shared, begun)
+        shared.ask()
+    return (folder / JOURNAL).read_bytes()
 
 
 def plain(trials: list[FinishedTrial]) -> list[tuple[object, ...]]:
@@ -46,17 +63,12 @@ def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[FinishedTr
 
 
 @pytest.mark.parametrize("cut", range(1, 30, 4))
-def test_another_process_continues_the_tuning(cut: int, tmp_path: Path, expected: list[FinishedTrial]) -> None:
-    with Trials(tmp_path, planned(trials=14)) as shared:
-        for _ in range(11):
-            begun = shared.ask()
-            assert begun is not None
-            end(shared, begun)
-        shared.ask()
-    journal = tmp_path / JOURNAL
-    lines = journal.read_bytes().splitlines(keepends=True)
+def test_another_process_continues_the_tuning(
+    cut: int, half: bytes, tmp_path: Path, expected: list[FinishedTrial]
+) -> None:
+    lines = half.splitlines(keepends=True)
     kept = b"".join(lines[: len(lines) - cut])
-    journal.write_bytes(kept + lines[len(lines) - cut][: 3 * cut])  # killed while it wrote
+    (tmp_path / JOURNAL).write_bytes(kept + lines[len(lines) - cut][: 3 * cut])  # killed while it wrote
     assert plain(all_of(tmp_path)) == plain(expected)
 
 

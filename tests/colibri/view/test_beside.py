@@ -14,8 +14,6 @@ from colibri.common.types import Array
 from colibri.experiments.flight import fly
 from tools.harness.processes import states
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 DURATION_S = 2.0
 
 

@@ -13,8 +13,6 @@ from colibri.mavlink.wire.dialect import Codec, mav
 from tools.harness.observer import Observer, Sight
 from tools.harness.processes import Process, running, wait_for
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 HIGH = ("--vehicle", "hummingbird", "--start", "y=0,z=3,psi=90,rotors=4740")
 SPEED = 2.0
 PLACE = (0.0, 0.0, 3.0)

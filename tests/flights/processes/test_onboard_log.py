@@ -18,8 +18,6 @@ from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from tests.support.log_conversations import DownloadLog, ListLogs
 from tools.harness.processes import vehicle
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 
 

@@ -7,8 +7,6 @@ import pytest
 
 from tools.harness.processes import THESIS_PLANT, Process, fly_thesis, running, start_autopilot, start_plant, states
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 
 @pytest.mark.long
 def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:

@@ -11,8 +11,6 @@ from colibri.common.process.status import Status
 from colibri.plant.process.reports import Silence
 from tools.harness.processes import Process, running, topic_rows, wait_for
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 HIGH = ("--start", "z=500,psi=0,rotors=4740")
 
 

@@ -11,8 +11,6 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from tools.harness.ports import Relay
 from tools.harness.processes import Process, fly, running, start_autopilot, start_plant, states, topic_rows
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 ON_SENSORS = ("spiral", "--feedback", "sensors")
 
 

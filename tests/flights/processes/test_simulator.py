@@ -7,8 +7,6 @@ import pytest
 
 from tools.harness.processes import Process, running, topic_rows, wait_for
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 
 @pytest.mark.long
 @pytest.mark.parametrize("vehicle", ["jmavsim", "hummingbird"])

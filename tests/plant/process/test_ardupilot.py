@@ -20,8 +20,6 @@ from tests.support.ardupilot import pulses, read, request
 from tests.support.recorded import begins_as_recorded
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 VEHICLE = load_vehicle("hummingbird")
 PHYSICS = Physics(VEHICLE, "rk4")
 MOTORS = VEHICLE.rotors.numbering()

@@ -26,8 +26,6 @@ from colibri.plant.vehicle.description import load_vehicle
 from tests.support.strangers import Airframe, Known, Point, hovering
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows, wait_for
 
-pytestmark = pytest.mark.usefixtures("forked")
-
 PX4, OTHER = ("127.0.0.1", 4561), ("127.0.0.1", 4562)
 STOPPED = Motors((0.0,) * 4, armed=False)
 VEHICLE = load_vehicle("jmavsim")
