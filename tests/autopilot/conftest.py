@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.control.registry import registered, registered_origin
-from colibri.cli.main import main
+from tests.support.commands import exit_code
 from tests.support.foreign import LAW, TRACK, Ended, FlyTheirs, Package
 
 
@@ -26,10 +26,7 @@ def fly_theirs(
         monkeypatch.setenv("PYTHONPATH", package.install(tmp_path, source))
         monkeypatch.syspath_prepend(tmp_path)
         forget()
-        try:
-            code: int | str | None = main(["fly", *words, "--quiet", "--no-figures", "--out", str(tmp_path / "out")])
-        except SystemExit as ended:
-            code = ended.code
+        code = exit_code(["fly", *words, "--quiet", "--no-figures", "--out", str(tmp_path / "out")])
         return Ended(code, capfd.readouterr().err)
 
     yield fly
