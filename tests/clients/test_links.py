@@ -44,6 +44,6 @@ def test_mavsdk_over_tcp(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
-        run_script("flights.generic", flown.mavsdk_url, tmp_path)
+        run_script("flights.generic", f"udpout://127.0.0.1:{flown.port}", tmp_path)
         flown.seen.wait_until_disarmed()
         assert 2.7 < max(sight.height_m for sight in flown.seen.sights) < 3.1

@@ -26,7 +26,7 @@ HOME: Vector = (0.0, 0.0, 0.0)
 def run(name: str, flown: SitlProcess, folder: Path) -> None:
     room = folder / name
     room.mkdir()
-    run_script(name, flown.mavsdk_url, room)
+    run_script(name, f"udpout://127.0.0.1:{flown.port}", room)
 
 
 @contextmanager

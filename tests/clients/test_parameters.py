@@ -8,6 +8,7 @@ from pathlib import Path
 from tools.harness.processes import vehicle
 
 NAME = "SYS_AUTOCONFIG"
+PROGRAM = "tests.clients.support.int_parameters"
 SIGNALLING = [(-8388607, -4194305), (2139095041, 2143289343)]
 """INT32 values whose bits, taken for a float, are those of a signalling NaN."""
 VALUES = (
@@ -19,7 +20,7 @@ VALUES = (
 def test_every_integer_survives_the_way_there_and_back(tmp_path: Path) -> None:
     with vehicle(tmp_path) as flown:
         values = [str(value) for value in VALUES]
-        command = [sys.executable, "-m", "tests.clients.support.int_parameters", flown.mavsdk_url, NAME, *values]
+        command = [sys.executable, "-m", PROGRAM, f"udpout://127.0.0.1:{flown.port}", NAME, *values]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert tuple(json.loads(done.stdout.splitlines()[-1])) == VALUES

@@ -45,8 +45,8 @@ def test_example_prints_what_it_says(
         assert promised(path) in run(tmp_path, *pytest_of, f"--rootdir={tmp_path}", str(path))
     elif path.stem.endswith("_takeoff"):
         with vehicle(tmp_path, speed=SPEED) as flown:
-            url = flown.mavsdk_url if path.stem.startswith("mavsdk") else f"udpout:127.0.0.1:{flown.port}"
-            assert run(tmp_path, str(path), url).strip() == promised(path)
+            scheme = "udpout://" if path.stem.startswith("mavsdk") else "udpout:"
+            assert run(tmp_path, str(path), f"{scheme}127.0.0.1:{flown.port}").strip() == promised(path)
     elif path.stem == STARTS_PROCESSES:
         assert run(tmp_path, str(path)).strip() == promised(path)
     else:
