@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from importlib import import_module
-from multiprocessing import get_context
+from multiprocessing.context import ForkProcess
 from types import SimpleNamespace
 from typing import IO, Any, NoReturn
 
@@ -14,30 +14,25 @@ from colibri.common.process.output import finish_outputs
 from colibri.flights.launcher import Child, ProcessSpec
 
 
-class Forked:
-    """What is used here of `subprocess.Popen`, for `python -m MODULE WORDS...`."""
+class Forked(ForkProcess):
+    """`python -m MODULE WORDS...`, used as `subprocess.Popen` is."""
 
     def __init__(self, command: list[str], stdout: IO[bytes], stderr: IO[bytes], **_: Any) -> None:
         module, *words = command[command.index("-m") + 1 :]
-        target = get_context("fork").Process(target=_run, args=(module, words, stdout.fileno(), stderr.fileno()))
-        target.start()
-        self._process = target
-        assert target.pid is not None
-        self.pid = target.pid
-        self.kill, self.terminate = target.kill, target.terminate
+        super().__init__(target=_run, args=(module, words, stdout.fileno(), stderr.fileno()))
+        self.start()
 
     def poll(self) -> int | None:
-        return self._process.exitcode
+        return self.exitcode
 
     def wait(self, timeout: float | None = None) -> int:
-        self._process.join(timeout)
-        code = self._process.exitcode
-        if code is None:
-            raise subprocess.TimeoutExpired(self._process.name, timeout or 0.0)
-        return code
+        self.join(timeout)
+        if self.exitcode is None:
+            raise subprocess.TimeoutExpired(self.name, timeout or 0.0)
+        return self.exitcode
 
     def send_signal(self, number: int) -> None:
-        if self.poll() is None:
+        if self.is_alive() and self.pid is not None:
             os.kill(self.pid, number)
 
 

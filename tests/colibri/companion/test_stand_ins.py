@@ -20,8 +20,6 @@ from tests.colibri.companion.stand_in import (
     StandIn,
 )
 
-STACKS: list[Callable[[], StandIn]] = [Px4, ArduPilot]
-
 
 def test_it_flies_a_track() -> None:
     vehicle = ArduPilot()
@@ -95,7 +93,7 @@ def test_an_ardupilot_taking_climb_rates_is_refused() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("made", STACKS)
+@pytest.mark.parametrize("made", [Px4, ArduPilot])
 def test_an_identification_finds_what_the_stand_in_has(made: Callable[[], StandIn]) -> None:
     vehicle = made()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, identifies=True))

@@ -113,15 +113,6 @@ def test_a_falling_vehicle_armed_by_force_recovers(sitl: Sitl) -> None:
     assert sitl.speed_m_s < 0.1
 
 
-@pytest.mark.sitl(airborne=1.0)
-def test_a_landed_vehicle_disarmed_by_hand_arms_again(sitl: Sitl) -> None:
-    sitl.select(Mode.LAND)
-    sitl.wait_until(lambda: sitl.inside.copter.pilot.ground.standing, within=8.0)
-    sitl.disarm()
-    assert sitl.mode is Mode.HOLD
-    sitl.arm()
-
-
 @pytest.mark.sitl(airborne=2.0, params={"RTL_RETURN_ALT": 4.0, "RTL_MIN_DIST": 2.0, "COM_DISARM_LAND": 0.2})
 def test_return_climbs_flies_home_and_lands(sitl: Sitl) -> None:
     sitl.goto(4.0, -3.0, 2.0)
@@ -160,10 +151,15 @@ def test_an_autopilot_without_memory_holds_in_mid_air(sitl: Sitl) -> None:
 
 @pytest.mark.sitl(params={"COM_DISARM_LAND": 0.2})
 def test_the_battery_is_counted_across_flights(sitl: Sitl) -> None:
-    for _ in range(2):
-        sitl.takeoff(0.5)
-        sitl.run(1.0)
-        sitl.land()
+    sitl.takeoff(0.5)
+    sitl.run(1.0)
+    sitl.select(Mode.LAND)
+    sitl.wait_until(lambda: sitl.inside.copter.pilot.ground.standing, within=8.0)
+    sitl.disarm()  # by hand, before it disarms itself
+    assert sitl.mode is Mode.HOLD
+    sitl.takeoff(0.5)
+    sitl.run(1.0)
+    sitl.land()
     sitl.run(0.6)
     consumed_mah = sitl.gcs.latest("BATTERY_STATUS").current_consumed
     assert consumed_mah == pytest.approx(1e3 * sitl.inside.world.charge_used_ah, abs=1.0)
