@@ -54,7 +54,7 @@ PLACES: tuple[str, ...] = (
     "autopilot.control.loop:ControlLoop.decide",
     "autopilot.control.loop:ControlLoop._command",
     "autopilot.control.lpv_mpc.law:LpvMpc.step",
-    "autopilot.control.lpv_mpc.law:LpvMpc._seen",
+    "autopilot.control.lpv_mpc.law:LpvMpc._inputs",
     "autopilot.control.lpv_mpc.mpc:Mpc.plan",
     "autopilot.control.lpv_mpc.mpc:Mpc.solve",
     "autopilot.core.report:Reporter.report",
