@@ -1,4 +1,4 @@
-"""Commands of `colibri` in forks of the tests' process, which has loaded what they need: a start takes no second."""
+"""Run commands of `colibri` in forks of the test process, whose modules are already loaded."""
 
 import os
 import signal

@@ -198,7 +198,8 @@ class LpvMpc(AttitudeController[LawMemory]):
         p, v, a, _, _, yaw, _, _ = references
         last, targets, qps = memory.plan.commands if memory.plan else _UNKNOWN, self._targets, self._mpc.on_clock
         begun, aim = planning.begin_by_clock(p, v, a, yaw, targets.law, targets.record, qps.kind, last, *inputs)
-        return self._decide(memory, _seen(state, inputs, begun), Wanted(targets.record, aim), qps, condensed=True)
+        seen = _seen(memory, state, inputs, begun)
+        return self._decide(memory, seen, Wanted(targets.record, aim), qps, condensed=True)
 
     def step_on_path(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
@@ -221,7 +222,7 @@ class LpvMpc(AttitudeController[LawMemory]):
     def _observe(self, memory: LawMemory, state: VehicleState) -> _Seen:
         """Observe the vehicle, and fill the start of a plan."""
         state, inputs = self._inputs(memory, state)
-        return _seen(state, inputs, planning.begin(*inputs))
+        return _seen(memory, state, inputs, planning.begin(*inputs))
 
     def _inputs(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, tuple[Any, ...]]:
         """Return the state in the level frame, and the arguments of `planning.begin`."""
@@ -284,9 +285,9 @@ class LpvMpc(AttitudeController[LawMemory]):
         return squared
 
 
-def _seen(state: VehicleState, inputs: tuple[Any, ...], begun: tuple[float, float, float]) -> _Seen:
-    charge_ah, mass_kg, max_speed = begun
-    return state, Tracked(inputs[4], inputs[-2], inputs[-1], charge_ah, mass_kg), max_speed
+def _seen(memory: LawMemory, state: VehicleState, inputs: tuple[Any, ...], begun: tuple[float, float, float]) -> _Seen:
+    (*_, measured, estimate), (charge_ah, mass_kg, max_speed) = inputs, begun
+    return state, Tracked(memory.tracked.rotors, measured, estimate, charge_ah, mass_kg), max_speed
 
 
 def _planned(memory: LawMemory, measured: Array) -> bool:

@@ -126,7 +126,7 @@ def begin_by_clock(
     airborne: bool, states: Array, age: int, tracker: Packed, battery: Packed, now: Packed, vehicle: Packed,
     measured: Array, estimate: Array,
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float, float]]:  # fmt: skip
-    """Do in one call what `begin`, `follow` and, unless recovery may be needed, `condense` do; return their results."""
+    """Run `begin`, `follow` and, unless recovery may be needed, `condense`; return the results of the first two."""
     begun = begin(
         position, velocity, attitude, rate, rotors, before, estimate_before, mass_kg, charge_ah, airborne, states, age,
         tracker, battery, now, vehicle, measured, estimate,

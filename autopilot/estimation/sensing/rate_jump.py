@@ -1,7 +1,8 @@
-"""A rate that jumps within one sample and stays: a bias of the gyroscope, or a turn by a knock.
+"""Rates that jump within one sample: by a bias of the gyroscope, a knock, or, sample after sample, white noise.
 
-The magnetic field decides: from the last field before the jump, the rates with and without it predict two fields.
-A jump about the field itself turns no field; it stays undecided, for the filter to find.
+The magnetic field tells a bias from a knock: from the last field before the jump, the rates with and without it predict
+two fields.
+A jump about the direction of the field changes no field: it stays undecided, and the filter finds it.
 """
 
 from math import dist
@@ -17,8 +18,8 @@ _BEFORE_PART, _AFTER_PART = 0.25, 0.8  # of the jump: larger changes before it, 
 _FITS_PART, _FITS_SIGMAS = 0.02, 5.0  # of the field and of its noise: a prediction with a smaller error fits
 _CONTRADICTED = 2.0  # times that: the least error of the other prediction
 _WITHIN_S = 0.4
-_WILD_RAD_S = 3.0  # of the difference between two changes, summed over the axes
-_JUMP_SHAKES = 2  # that one jump makes
+_WILD_RAD_S = 3.0  # least difference between the changes in two samples, summed over the axes
+_JUMP_SHAKES = 2  # samples with such a difference at one jump
 
 
 class RateJump:
