@@ -19,6 +19,11 @@ Packed: TypeAlias = NDArray[np.void]
 
 _LINE = 64  # bytes of a cache line
 
+_Numbers: TypeAlias = tuple[np.dtype[Any], tuple[int, ...]]
+_Form: TypeAlias = tuple[tuple[str, ...], tuple[Any, ...]]
+"""Names of fields, and for each its `_Form` or `_Numbers`."""
+_FLOAT: _Numbers = (np.dtype(np.float64), ())
+
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Tuple = TypeVar("_Tuple", bound=NamedTuple)
 
@@ -55,7 +60,7 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 def packed(parameters: NamedTuple) -> Packed:
     """Return the record of `parameters`, (1,), a kernel's argument, aligned to cache lines."""
-    layout = _layout(parameters)
+    layout = _layout(*_form(parameters))
     memory = np.zeros(layout.itemsize + _LINE, dtype=np.uint8)
     begin = -memory.ctypes.data % _LINE
     record = memory[begin : begin + layout.itemsize].view(layout)
@@ -73,22 +78,29 @@ def _opened(field: Packed) -> Any:
     return field[0] if names is None else tuple(_opened(field[name]) for name in names)
 
 
-def _layout(parameters: Any) -> np.dtype[np.void]:
-    formats, offsets, end = [], [], 0
-    for value in parameters:
-        part = _layout(value) if hasattr(value, "_fields") else np.dtype(getattr(value, "dtype", np.float64))
-        whole = part if part.names else np.dtype((part, np.shape(value)))
-        unit = _LINE if whole.itemsize >= _LINE else part.alignment
-        offsets.append(-(-end // unit) * unit)
-        formats.append(whole)
-        end = offsets[-1] + whole.itemsize
-    return _one_of_its_kind(np.dtype({"names": parameters._fields, "formats": formats, "offsets": offsets}))
+def _form(parameters: Any) -> _Form:
+    return parameters._fields, tuple([_part(value) for value in parameters])
+
+
+def _part(value: Any) -> _Form | _Numbers:
+    if isinstance(value, float):
+        return _FLOAT
+    if hasattr(value, "_fields"):
+        return _form(value)
+    return np.dtype(getattr(value, "dtype", np.float64)), np.shape(value)
 
 
 @cache
-def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
-    """Return the first equal type: kernels recognise it three times as fast as a copy."""
-    return layout
+def _layout(names: tuple[str, ...], parts: tuple[Any, ...]) -> np.dtype[np.void]:
+    """Return one type for all records of a form: kernels recognise it three times as fast as a copy."""
+    formats, offsets, end = [], [], 0
+    for part in parts:
+        whole = np.dtype(part) if isinstance(part[0], np.dtype) else _layout(*part)
+        unit = _LINE if whole.itemsize >= _LINE else whole.base.alignment
+        offsets.append(-(-end // unit) * unit)
+        formats.append(whole)
+        end = offsets[-1] + whole.itemsize
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets})
 
 
 def on_compile(report: Callable[[int], None]) -> None:
