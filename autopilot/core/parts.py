@@ -1,6 +1,6 @@
 """The parts of a vehicle that ground stations fly, put together around one profile."""
 
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 
 from colibri.autopilot.commander.fence import Fence
@@ -28,12 +28,15 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.guidance import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.identities import conventions_of
-from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour
 from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import WARNING
 from colibri.plant.vehicle.description import Vehicle
+
+_LOADED = set[str]()
+"""Control laws whose compiled code was loaded by a trial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ def parts_of(
     """Return the parts of a vehicle; arguments and errors are those of `copter_autopilot`."""
     numbers = Numbers(profile, vehicle)
     conventions = conventions_of(settings.identity)
-    parameters = conventions.parameters(definitions(profile, vehicle, settings.system_id), settings.system_id)
+    parameters = conventions.parameters(numbers.of_vehicle(settings.system_id), settings.system_id)
     parameters.load(values or {})
     flown, assumed = numbers.applied(parameters.values)
     flies_by = behaviour(parameters)
@@ -104,8 +107,12 @@ def parts_of(
     battery = BatteryMonitor(assumed)
     trial = VehicleTrial(loop, rotor_loss, planned_at)
     tuning = Retuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
-    with nullcontext() if values else suppress(ImpossibleError):  # compiles what a change in flight needs
+    if values:
         tuning.try_all(parameters.values)
+    elif profile.controller not in _LOADED:  # what a change in flight needs
+        _LOADED.add(profile.controller)
+        with suppress(ImpossibleError):
+            tuning.try_all(parameters.values)
     parameters.ask(tuning.prepare, tuning.is_ready)
     snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)
     leads = () if attitude is None else (attitude,)

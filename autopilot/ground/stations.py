@@ -153,7 +153,7 @@ class Stations:
             [ModeInfo(each.name, each.number, each.standard, each.selectable) for each in book.modes if each.flies],
             lambda number, _: commands.modes.select(number),
         )
-        metadata = Metadata(metadata_json(parameters))
+        metadata = Metadata(metadata_json(tuple(parameters)))
         files = _files(settings, metadata, parameters)
         self._provide(modes, metadata)
         self._obeys = CommandService(self._handlers(commands, modes), self._text)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -39,10 +40,11 @@ BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
 """Fields that only ArduCopter's parameters set, where they are defined."""
 
 
-def behaviour_parameters(system_id: int) -> list[Parameter]:
+@cache
+def behaviour_parameters(system_id: int) -> tuple[Parameter, ...]:
     numbers = {line.name: _default(line) if line.path else line.default for line in _LINES}
     numbers["MAV_SYS_ID"] = system_id
-    return [line.parameter(numbers[line.name]) for line in _LINES]
+    return tuple(line.parameter(numbers[line.name]) for line in _LINES)
 
 
 def behaviour(parameters: Parameters) -> Behaviour:

@@ -90,6 +90,10 @@ class Numbers:
         ]
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
+    def of_vehicle(self, system_id: int = 1) -> list[Parameter]:
+        """Return all parameters of a vehicle."""
+        return [*self.definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
+
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
         """Return profile and vehicle with these values, or raise ImpossibleError."""
         profile, vehicle = self._profile, self._vehicle
@@ -102,7 +106,7 @@ class Numbers:
 
 
 def definitions(profile: Profile, vehicle: Vehicle, system_id: int = 1) -> list[Parameter]:
-    return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
+    return Numbers(profile, vehicle).of_vehicle(system_id)
 
 
 def _vehicle(tree: dict[str, Any]) -> Vehicle:
@@ -122,7 +126,7 @@ def with_parameters(
 ) -> tuple[Profile, Vehicle]:
     """Return the profile and the autopilot's vehicle with these parameters, or raise ChoiceError or ImpossibleError."""
     numbers = Numbers(profile, vehicle)
-    known = {each.name: each for each in definitions(profile, vehicle)}
+    known = {each.name: each for each in numbers.of_vehicle()}
     for name, value in values.items():
         if name not in known:
             raise ChoiceError(unknown("parameter", name, known))

@@ -1,7 +1,8 @@
 """The component metadata protocol, over FTP: https://mavlink.io/en/services/component_metadata.html."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 from zlib import crc32
 
@@ -40,7 +41,8 @@ def checksum(data: bytes) -> int:
     return crc32(data, _UINT32_MAX) ^ _UINT32_MAX
 
 
-def metadata_json(parameters: Iterable[Parameter]) -> bytes:
+@lru_cache(maxsize=16)
+def metadata_json(parameters: tuple[Parameter, ...]) -> bytes:
     """Return MAVLink's component_metadata/parameter.schema.json."""
     content = {"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]}
     return json.dumps(content, separators=(",", ":")).encode()

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -31,10 +32,15 @@ class Number(NamedTuple):
 
     def parameter(self, default: Value, group: str = "", details: str = "", wire: int = 0) -> Parameter:
         """Return the parameter; its bounds widen to include the default."""
-        same = {field: value for field, value in self._asdict().items() if field not in ("path", "scale", "kind")}
-        same |= {"minimum": min(self.minimum, default), "maximum": max(self.maximum, default), "default": default}
-        same |= {"details": details or self.details, "group": group or self.group}
-        return Parameter(**same, kind=ParamType.REAL if isinstance(default, float) else ParamType.INT, wire=wire)
+        return _parameter(self, default, group, details, wire)
+
+
+@lru_cache(maxsize=4096, typed=True)
+def _parameter(number: Number, default: Value, group: str, details: str, wire: int) -> Parameter:
+    same = {field: value for field, value in number._asdict().items() if field not in ("path", "scale", "kind")}
+    same |= {"minimum": min(number.minimum, default), "maximum": max(number.maximum, default), "default": default}
+    same |= {"details": details or number.details, "group": group or number.group}
+    return Parameter(**same, kind=ParamType.REAL if isinstance(default, float) else ParamType.INT, wire=wire)
 
 
 def _number(text: str) -> Value:

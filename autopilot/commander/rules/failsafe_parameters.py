@@ -1,6 +1,7 @@
 """Parameters of the failsafes, under PX4's names where the meaning is the same."""
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -27,8 +28,9 @@ _COPTER_BATTERY = (
 """Actions by ArduCopter's parameters, where they are defined."""
 
 
-def failsafe_parameters() -> list[Parameter]:
-    return [_action(line) if line.name in _CHOICES else line.parameter(line.default, GROUP) for line in _LINES]
+@cache
+def failsafe_parameters() -> tuple[Parameter, ...]:
+    return tuple(_action(line) if line.name in _CHOICES else line.parameter(line.default, GROUP) for line in _LINES)
 
 
 def _action(line: Number) -> Parameter:

@@ -109,7 +109,8 @@ class Mpc:
         )  # fmt: skip
         on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.terminal_on_hold = self._terminal(on_hold, settings.count_every, thrust_n)
+        terminals = {each: self._terminal(each, settings.count_every, thrust_n) for each in (on_hold, on_track)}
+        self.terminal_on_hold = terminals[on_hold]
         self.starts, self._effects = starts, speed_effects(starts, interval_s)
         blocks, rows = len(settings.blocks), constraints.MOTION_ROWS * (n // settings.check_every)
         shared = Workspace(
@@ -131,7 +132,7 @@ class Mpc:
                         np.arange(settings.count_every, n + 1, settings.count_every),
                         np.arange(settings.check_every, n + 1, settings.check_every),
                         each,
-                        self._terminal(each, settings.count_every, thrust_n),
+                        terminals[each],
                         numbers.allocation[0].copy(),
                         levels,
                         upright,

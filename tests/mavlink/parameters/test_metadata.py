@@ -60,7 +60,7 @@ TRACK = Parameter(
 
 def test_parameters_as_the_schema_has_them() -> None:
     """Keys and types: component_metadata/parameter.schema.json of the MAVLink repository."""
-    assert json.loads(metadata_json([SPEED, TRACK])) == {
+    assert json.loads(metadata_json((SPEED, TRACK))) == {
         "version": 1,
         "parameters": [
             {
