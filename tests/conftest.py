@@ -4,16 +4,18 @@ import gc
 import signal
 import threading
 from importlib import import_module
+from itertools import count
 
 import pytest
 from hypothesis import settings
 
-from colibri.common.process.lifecycle import freeze_once, use_one_thread
+from colibri.common.process.lifecycle import use_one_thread
 
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
 
 gc.set_threshold(20_000, 20, 20)
+_ENDED = count()  # tests, from their collection on
 use_one_thread()  # before numpy is loaded: two workers have a core each
 
 # A shell's background job ignores Ctrl-C, and so would every process that a test starts.
@@ -28,5 +30,11 @@ def pytest_collection_finish() -> None:
     patch.setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
     patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
     patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
-    gc.collect()
-    freeze_once()
+    pytest_runtest_logfinish()
+
+
+def pytest_runtest_logfinish() -> None:
+    """Keep it from what tests have loaded since, too."""
+    if next(_ENDED) % 20 == 0:
+        gc.collect()
+        gc.freeze()
