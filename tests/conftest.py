@@ -29,6 +29,7 @@ def pytest_collection_finish() -> None:
     patch, forks = pytest.MonkeyPatch(), import_module("tests.support.forks")
     patch.setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
     patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
+    patch.setattr("colibri.mavlink.links.udp.SPIN_S", 0.0)  # the tests beside them need the cores
     patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
     pytest_runtest_logfinish()
 
