@@ -2,19 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
+from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 from tests.support import sensor_source as source
-from tests.support.estimates import Change, error_m, estimates, known, recorded
-from tests.support.sensor_source import INTERVAL_US
+from tests.support.estimates import Change, error_m, estimates, estimator, known, recorded
+from tests.support.sensor_source import INTERVAL_US, Recording
 
 BEGAN_S = 16.0
 LONG = pytest.mark.long
@@ -28,7 +32,21 @@ def plus(vector: Vector, other: Vector, times: float = 1.0) -> Vector:
 
 
 def fails(change: Change) -> Change:
-    return lambda frame, t: frame if t < BEGAN_S else change(frame, t - BEGAN_S)
+    return lambda frame, t: change(frame, t - BEGAN_S)
+
+
+@lru_cache(maxsize=2)
+def begun(path: source.Path, seed: int, duration_s: float) -> tuple[Estimator, ObjectSnapshot, list[Estimate | None]]:
+    seeing, frames = estimator(), recorded(path, seed, duration_s).frames
+    of = [seeing.step(frame) for frame in frames if frame.time_us * 1e-6 < BEGAN_S]
+    return seeing, ObjectSnapshot([seeing]), of
+
+
+def failing(path: source.Path, seed: int, duration_s: float, change: Change) -> tuple[Recording, list[Estimate | None]]:
+    """Return a recording, and its estimates with a change from `BEGAN_S` on."""
+    flight, (seeing, snapshot, of) = recorded(path, seed, duration_s), begun(path, seed, duration_s)
+    snapshot.restore()
+    return flight, [*of, *(seeing.step(change(frame, frame.time_us * 1e-6)) for frame in flight.frames[len(of) :])]
 
 
 def felt(bias: Vector) -> Change:
@@ -48,8 +66,7 @@ def told(lie: GpsLie) -> Change:
     ],
 )
 def test_a_sudden_accelerometer_bias_is_found_in_time(path: source.Path, bias: Vector) -> None:
-    flight = recorded(path, 3, 22.5)
-    of = estimates(flight.frames, felt(bias))
+    flight, of = failing(path, 3, 22.5, felt(bias))
     last = known(of)[-1]
     learning = [one for one in known(of) if not one.health.accel_bias]
     assert (learning[0].frame.time_us * 1e-6 - BEGAN_S) < 1.2
@@ -86,7 +103,7 @@ ALL_OF_GPS = {"all of it slides sideways": sliding((1.5, 0.0, 0.0)), "all of it 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("lie", [*VELOCITY_ALONE.values(), *ALL_OF_GPS.values()], ids=[*VELOCITY_ALONE, *ALL_OF_GPS])
 def test_a_receiver_that_lies_is_no_bias(path: source.Path, lie: GpsLie) -> None:
-    of = known(estimates(recorded(path, 5, 22.0).frames, told(lie)))
+    of = known(failing(path, 5, 22.0, told(lie))[1])
     assert of[-1].health.gps_glitch
     assert of[-1].resets == 0
     assert all(one.health.gyro_bias for one in of)
@@ -119,7 +136,7 @@ def test_a_knock_is_no_accelerometer_bias(knock: Vector) -> None:
             return frame
         return frame._replace(specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, knock))
 
-    of = known(estimates(recorded(source.hover, 7, 19.0).frames, fails(knocked)))
+    of = known(failing(source.hover, 7, 19.0, fails(knocked))[1])
     assert any(one.health.gps_glitch for one in of)
     assert all(one.health.accel_bias for one in of)
 
@@ -145,8 +162,7 @@ def magnetised(iron: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
     ],
 )
 def test_a_sudden_gyroscope_bias_is_found_in_time(path: source.Path, bias: Vector) -> None:
-    flight = recorded(path, 3, 24.5)
-    of = estimates(flight.frames, turned(bias))
+    flight, of = failing(path, 3, 24.5, turned(bias))
     last = known(of)[-1]
     learning = [one for one in known(of) if not one.health.gyro_bias]
     assert learning[0].frame.time_us * 1e-6 - BEGAN_S < 3.0
@@ -163,8 +179,7 @@ def test_a_sudden_gyroscope_bias_is_found_in_time(path: source.Path, bias: Vecto
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("bias", [(0.8, 0.0, 0.0), (-2.0, 5.0, 0.5)])
 def test_a_large_gyroscope_bias_is_found_before_the_vehicle_tilts(path: source.Path, bias: Vector) -> None:
-    flight = recorded(path, 3, 17.0)
-    of = estimates(flight.frames, turned(bias))
+    flight, of = failing(path, 3, 17.0, turned(bias))
     found, biased = next(one for one in known(of) if not one.health.gyro_bias), flight.gyro_bias[-1] + bias
     assert found.frame.time_us * 1e-6 - BEGAN_S < 0.12
     assert np.allclose(found.gyro_bias_rad_s, biased, atol=0.05 * hypot(*bias))
@@ -188,15 +203,14 @@ def test_a_vehicle_that_is_turned_by_a_knock_has_no_gyroscope_bias(turn: Vector)
             magnetic_field_flu_gauss=tuple(to_body.apply(frame.magnetic_field_flu_gauss).tolist()),
         )
 
-    flight = recorded(source.hover, 7, 18.0)
-    of = known(estimates(flight.frames, fails(knocked)))
+    flight, estimated = failing(source.hover, 7, 18.0, fails(knocked))
+    of = known(estimated)
     assert all(one.health.gyro_bias and one.health.attitude for one in of)
     assert np.allclose(of[-1].gyro_bias_rad_s, flight.gyro_bias[-1], atol=0.002)
 
 
 def test_a_gyroscope_drift_is_followed() -> None:
-    flight = recorded(source.hover, 3, 30.0)
-    of = estimates(flight.frames, turned((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)))
+    flight, of = failing(source.hover, 3, 30.0, turned((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)))
     assert known(of)[-1].gyro_bias_rad_s[0] == pytest.approx(flight.gyro_bias[-1, 0] + 0.14, abs=0.02)
     assert max(error_m(flight, of, t) for t in np.arange(BEGAN_S, 29.9, 0.1)) < 1.5
 
@@ -212,6 +226,6 @@ def test_a_gyroscope_drift_is_followed() -> None:
     ],
 )
 def test_a_field_beside_the_magnetometer_is_no_gyroscope_bias(path: source.Path, change: Change) -> None:
-    of = known(estimates(recorded(path, 5, 25.0).frames, change))
+    of = known(failing(path, 5, 25.0, change)[1])
     assert any(RejectedSource.MAGNETOMETER in one.health.not_accepted for one in of)
     assert all(one.health.gyro_bias for one in of)

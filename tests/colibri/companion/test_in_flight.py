@@ -1,6 +1,7 @@
 """A companion flies a vehicle of `colibri sitl`, and ends when it must, in memory and in simulated time."""
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 from math import nan
 from typing import Any
@@ -13,6 +14,7 @@ from colibri.companion.settings import CompanionSettings, SetpointKind
 from colibri.companion.stack import COLIBRI
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.supervision.rules import FlightLimits
+from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
@@ -22,12 +24,33 @@ from tests.colibri.companion.in_memory import Ride
 MOVES = frozenset({mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_COMPONENT_ARM_DISARM, mav.MAV_CMD_NAV_TAKEOFF})
 SETPOINTS = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED")
 HOVER = "hover:height=3"
+Flying = Callable[[FlightLimits], Ride[Sitl]]
 
 
 @pytest.fixture
 def flights() -> Iterator[Flights]:
     with Flights(Setting(), None) as begun:
         yield begun
+
+
+@pytest.fixture(scope="module")
+def flying() -> Iterator[Flying]:
+    """Return a function that flies within limits, from the same instant each time."""
+
+    @cache
+    def first(limits: FlightLimits) -> tuple[Ride[Sitl], ObjectSnapshot]:
+        ride = in_air(begun, CompanionSettings(limits=limits)).flying(10.0)
+        for _ in range(100):
+            ride.step()
+        return ride, ObjectSnapshot([ride])
+
+    def restored(limits: FlightLimits) -> Ride[Sitl]:
+        ride, snapshot = first(limits)
+        snapshot.restore()
+        return ride
+
+    with Flights(Setting(), None) as begun:
+        yield restored
 
 
 def messages_of(ride: Ride[Sitl], since_us: int = 0) -> list[Message]:
@@ -190,11 +213,9 @@ AS_IT_IS = FlightLimits()
     ],
 )
 def test_each_limit_ends_it_and_leaves_the_vehicle_in_hold(
-    flights: Flights, name: str, provoke: Callable[[Ride[Sitl]], Callable[[], None] | None], limits: FlightLimits
+    flying: Flying, name: str, provoke: Callable[[Ride[Sitl]], Callable[[], None] | None], limits: FlightLimits
 ) -> None:
-    ride = in_air(flights, CompanionSettings(limits=limits)).flying(10.0)
-    for _ in range(100):
-        ride.step()
+    ride = flying(limits)
     goes_on = provoke(ride)
     provoked_us = ride.now_us
     while ride.companion.phase is CompanionPhase.FLYING:
