@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from errno import ENOSPC
+from functools import cache
 from io import StringIO
 from math import cos, hypot, pi, sin
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ from colibri.companion.steering.references import Stay, stay_of
 from colibri.companion.supervision.phases import CompanionPhase, Consistency, PhaseCondition, how_it_ended
 from colibri.companion.supervision.rules import LIMITS
 from colibri.companion.vehicle_peer import VehiclePeer
+from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, mav
 from tests.colibri.companion.in_memory import Ride
@@ -35,6 +37,19 @@ def hovering(
     vehicle = vehicle or Px4()
     vehicle.position[:], vehicle.attitude, vehicle.armed = HERE, NORTH_WEST, True
     return Ride(vehicle, track, settings or CompanionSettings(stay=stay_of(track)))
+
+
+@cache
+def began_to_hover() -> tuple[Ride[StandIn], ObjectSnapshot]:
+    ride = hovering().flying(8.0)
+    return ride, ObjectSnapshot([ride])
+
+
+def flying() -> Ride[StandIn]:
+    """Return the ride that hovers, from the same instant each time."""
+    ride, snapshot = began_to_hover()
+    snapshot.restore()
+    return ride
 
 
 @pytest.mark.parametrize(("options", "place"), [("", HERE), (":height=7", (12.0, -7.0, 7.0))])
@@ -164,7 +179,7 @@ class _FullDisk(StringIO):
 
 
 def test_a_log_that_cannot_be_written_hands_the_vehicle_over() -> None:
-    ride = hovering().flying(8.0)
+    ride = flying()
     log = _Log(_FullDisk(), FlightSummary())
     while ride.companion.ended is None:
         ride.step()
@@ -216,7 +231,7 @@ def test_another_sender_does_not_take_the_link() -> None:
     ],
 )
 def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str, within_s: float) -> None:
-    ride = hovering().flying(8.0)
+    ride = flying()
     ride.sitl.silent.add(message)
     ride.until(lambda: ride.companion.phase is not CompanionPhase.FLYING, within_s)
     assert ride.companion.limit is not None
@@ -225,7 +240,7 @@ def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str
 
 
 def test_stuck_body_rates_end_the_flight_before_it_leans() -> None:
-    ride = hovering().flying(8.0)
+    ride = flying()
     ride.sitl.frozen_rate = (0.0, 1.5, 0.0)
     leaned = 0.0
     while ride.companion.ended is None:
