@@ -1,7 +1,8 @@
 """Flights without a known position or attitude, and with sensors that are suddenly wrong."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from math import dist, hypot
 
 import pytest
@@ -10,9 +11,12 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.core.step import Step
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.wire.dialect import mav
+from colibri.sitl.backends.setting import setting_of
+from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 from tests.support.failed_sensors import Fault, flown_on, matrix, singles
 from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
@@ -22,6 +26,27 @@ pytestmark = [QUICK, pytest.mark.sitl(params={"COM_DISARM_LAND": 0.1})]
 
 ON_SENSORS = pytest.mark.sitl(feedback="sensors", seed=3)
 OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
+Hovering = Callable[[str, float], Sitl]
+
+
+@pytest.fixture(scope="module")
+def hovering() -> Iterator[Hovering]:
+    """Return a function that flies in a wind at a height, from the same instant each time."""
+
+    @cache
+    def first(wind: str, height_m: float) -> tuple[Sitl, ObjectSnapshot]:
+        sitl = begun.begin(wind=wind)
+        sitl.takeoff(height_m)
+        return sitl, ObjectSnapshot([sitl])
+
+    def restored(wind: str, height_m: float) -> Sitl:
+        sitl, snapshot = first(wind, height_m)
+        snapshot.restore()
+        return sitl
+
+    blind = {"feedback": "sensors", "seed": 2, "strict": False, "params": {"COM_DISARM_LAND": 0.1}}
+    with Flights(setting_of([QUICK.kwargs, blind]), None) as begun:
+        yield restored
 
 
 @ON_SENSORS
@@ -95,10 +120,8 @@ def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
         (Fault("baro", "off"), "Warning: barometer lost"),
     ],
 )
-@pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
-def test_without_a_sensor_it_lands_softly(sitl: Sitl, fault: Fault, says: str) -> None:
-    sitl.takeoff(3.0)
-    outcome = flown_on(sitl, [fault], watched_s=2.0)
+def test_without_a_sensor_it_lands_softly(hovering: Hovering, fault: Fault, says: str) -> None:
+    outcome = flown_on(hovering("5@270", 3.0), [fault], watched_s=2.0)
     assert not outcome.bad
     assert outcome.disarmed_s is not None
     assert outcome.disarmed_s < 10.0
@@ -106,9 +129,8 @@ def test_without_a_sensor_it_lands_softly(sitl: Sitl, fault: Fault, says: str) -
     assert not any("mpact" in text for text in outcome.texts)
 
 
-@pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
-def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
-    sitl.takeoff(2.0)
+def test_a_landing_without_gyroscope_ends_upright(hovering: Hovering) -> None:
+    sitl = hovering("5@270", 3.0)
     sitl.select(Mode.LAND)
     sitl.wait_until(lambda: sitl.position[2] < 0.8, within=10.0)
     sitl.inject("gyro", "delayed", 0, 2.0)
@@ -118,9 +140,8 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
 
 
 @pytest.mark.parametrize(("kind", "late_s"), [("stuck", 0.0), ("delayed", 0.03)])
-@pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
-def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(sitl: Sitl, kind: str, late_s: float) -> None:
-    sitl.takeoff(5.0)
+def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(hovering: Hovering, kind: str, late_s: float) -> None:
+    sitl = hovering("7@188", 5.0)
     sitl.goto(40.0, 0.0, 5.0, wait=False)
     sitl.run(3.0)
     sitl.goto(-40.0, 0.0, 5.0, wait=False)
@@ -130,9 +151,8 @@ def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(sitl: Sitl, kind:
     sitl.wait_until(lambda: sitl.said("Disarmed by landing"), within=20.0)
 
 
-@pytest.mark.sitl(feedback="sensors", seed=2, wind="7@188", strict=False)
-def test_with_a_large_gyroscope_bias_it_flies_on(sitl: Sitl) -> None:
-    sitl.takeoff(2.0)
+def test_with_a_large_gyroscope_bias_it_flies_on(hovering: Hovering) -> None:
+    sitl = hovering("7@188", 5.0)
     sitl.inject("gyro", "wrong", 0, -2.0, 1.0, 0.0)
     sitl.hold(lambda: sitl.tilt_deg < 30.0, for_=2.0)
     assert sitl.mode is Mode.HOLD
