@@ -5,7 +5,7 @@ from copy import deepcopy
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path, PurePath
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar, cast
 
 import msgspec
 
@@ -54,7 +54,8 @@ def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     """Read a strict structure; `error` names file and key of what is missing, unknown or invalid."""
     try:
-        return msgspec.convert(deepcopy(_parsed(read_bytes(path))), kind)
+        found: T = _converted(read_bytes(path), cast(Any, kind))
+        return found if _is_constant(found) else deepcopy(found)
     except OSError as reason:
         raise error(f"{path}: {reason.strerror}") from reason
     except msgspec.ValidationError as reason:
@@ -67,8 +68,17 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
 
 
 @lru_cache(maxsize=32)
-def _parsed(content: bytes) -> Any:
-    return msgspec.toml.decode(content)  # takes milliseconds, and every flight reads the same files
+def _converted(content: bytes, kind: Any) -> Any:
+    return msgspec.convert(msgspec.toml.decode(content), kind)  # takes milliseconds; every flight reads the same files
+
+
+def _is_constant(found: object) -> bool:
+    """Whether all parts are immutable, down to the last."""
+    try:
+        hash(found)
+    except TypeError:
+        return False
+    return True
 
 
 def _choices(kind: Any, key: str) -> str:
