@@ -3,19 +3,18 @@
 import gc
 import signal
 import threading
+from collections.abc import Generator
 from importlib import import_module
-from itertools import count
 
 import pytest
 from hypothesis import settings
 
-from colibri.common.process.lifecycle import use_one_thread
+from colibri.common.process.lifecycle import freeze_once, use_one_thread
 
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
 
 gc.set_threshold(20_000, 20, 20)
-_ENDED = count()  # tests, from their collection on
 use_one_thread()  # before numpy is loaded: two workers have a core each
 
 # A shell's background job ignores Ctrl-C, and so would every process that a test starts.
@@ -31,11 +30,15 @@ def pytest_collection_finish() -> None:
     patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
     patch.setattr("colibri.mavlink.links.udp.SPIN_S", 0.0)  # the tests beside them need the cores
     patch.setattr("tools.harness.processes.subprocess", forks.FORKS)
-    pytest_runtest_logfinish()
+    gc.collect()
+    freeze_once()
 
 
-def pytest_runtest_logfinish() -> None:
-    """Keep it from what tests have loaded since, too."""
-    if next(_ENDED) % 20 == 0:
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, object, object]:
+    """Keep it from what the tests of a file have loaded, too."""
+    done = yield
+    if nextitem is None or nextitem.path != item.path:
         gc.collect()
         gc.freeze()
+    return done
