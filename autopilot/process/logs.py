@@ -85,7 +85,7 @@ class AutopilotLog:
             *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6, duration_s * 1e6,
             cost, slack, *active, delay_us, mass_kg, path_lag_s, iterations,
         )  # fmt: skip
-        self.topics.add(DECISION, (time_us / 1e6, *decided))
+        self.topics.add(DECISION, (time_us, *decided))
         if self._views is not None:
             self._note(time_us, fallback)
             if self._thinning.is_due(time_us):
@@ -155,9 +155,9 @@ class AutopilotLog:
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
             self.topics.queue(encode_input(time_us, RecordKind.FRAME, datagram))
         first, others = split(controls)
-        self.topics.add(COMMAND, (time_us / 1e6, *first, armed))
+        self.topics.add(COMMAND, (time_us, *first, armed))
         if others:
-            self.topics.add(MORE_COMMAND, (time_us / 1e6, *others))
+            self.topics.add(MORE_COMMAND, (time_us, *others))
 
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
         setup = self._setup
@@ -187,7 +187,7 @@ class AutopilotLog:
     def _check_row(self, check: FilterCheck) -> tuple[float, ...]:
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
-        return (check.time_us / 1e6, *check.state, *check.covariance, *counts)
+        return (check.time_us, *check.state, *check.covariance, *counts)
 
 
 def log_in(folder: Path, setup: Setup) -> AutopilotLog:
@@ -202,7 +202,7 @@ def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
     deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
     biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
     counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
-    return (frame.time_us / 1e6, *state, *deviations, *biases, *counts)
+    return (frame.time_us, *state, *deviations, *biases, *counts)
 
 
 def _first(references: Horizon) -> tuple[float, ...]:

@@ -33,6 +33,7 @@ class Blocks(ABC):
     """Encoder of rows of some topics."""
 
     block_rows = BLOCK_ROWS  # rows of a block
+    head = b""  # of a row
 
     def __init__(self, columns: int) -> None:
         self.pack = Struct(f"<{columns}d")  # a row as doubles

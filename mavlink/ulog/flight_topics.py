@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.common.types import Array, PerRotor
-from colibri.mavlink.ulog.topics import head, message_layout
+from colibri.mavlink.ulog.topics import head, message_layout, row_layout
 
 _US_PER_S = 1e6
+_HEAD = Struct("<HBH")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +42,6 @@ class Topic:
         return ("t", *chain.from_iterable(each.names.split() for each in self.columns))
 
     @cached_property
-    def pack(self) -> Struct:
-        return Struct(f"<{len(self.names)}d")
-
-    @cached_property
     def fields(self) -> str:
         fields = (f"{each.kind} {name};" for each in self.columns for name in each.names.split())
         return "uint64_t timestamp;" + "".join(fields)
@@ -53,7 +50,18 @@ class Topic:
     def layout(self) -> np.dtype[np.void]:
         return message_layout(self.fields)
 
+    @cached_property
+    def head(self) -> bytes:
+        """Return the first bytes of each row's message."""
+        return _HEAD.pack(*head(self.layout, self.number))
+
+    @cached_property
+    def pack(self) -> Struct:
+        """Return the layout of a row in its message: time, µs, and the columns."""
+        return row_layout(self.fields)
+
     def encode(self, rows: Array) -> bytes:
+        """Encode rows with `t`; numbers beyond the range of a column become infinite, or wrap."""
         encoded = np.zeros(len(rows), self.layout)
         encoded["size"], encoded["kind"], encoded["number"] = head(self.layout, self.number)
         encoded["timestamp"] = np.rint(rows[:, :1] * _US_PER_S)

@@ -1,10 +1,9 @@
 """The log of a flight: topics as rows, written in blocks or kept in memory."""
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
-from itertools import starmap
+from struct import error
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -49,7 +48,7 @@ class TopicLog:
 
     def __init__(self, append: Callable[[bytes], object]) -> None:
         self.append = append
-        self._waiting: defaultdict[RowEncoder, list[Sequence[float]]] = defaultdict(list)
+        self._blocks: dict[RowEncoder, _Block] = {}
         self._queued: list[bytes] = []
         self._beginning = b""
 
@@ -57,10 +56,19 @@ class TopicLog:
         self._beginning = beginning
 
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
-        waiting = self._waiting[encoder]
-        waiting.append(row)
-        if len(waiting) >= encoder.block_rows:
-            self._take(encoder)
+        """Add a row: the time in µs, then the columns."""
+        block = self._blocks.get(encoder) or self._begin_block(encoder)
+        try:
+            block.pack_into(block.memory, block.used + block.head_bytes, *row)
+        except (error, OverflowError):
+            if not isinstance(encoder, Topic):
+                raise
+            with np.errstate(all="ignore"):
+                encoded = encoder.encode(np.array([(row[0] / 1e6, *row[1:])]))
+            block.memory[block.used : block.used + block.row_bytes] = encoded
+        block.used += block.row_bytes
+        if block.used == len(block.memory):
+            self._take(encoder, block)
 
     def queue(self, encoded: bytes) -> None:
         self._queued.append(encoded)
@@ -69,26 +77,47 @@ class TopicLog:
 
     def flush(self) -> None:
         self._append_queued()
-        for encoder, waiting in self._waiting.items():
-            if waiting:
-                self._take(encoder)
+        for encoder, block in self._blocks.items():
+            if block.used:
+                self._take(encoder, block)
 
     def close(self) -> None:
         with suppress(LogError):
             self.flush()
 
-    def _take(self, encoder: RowEncoder) -> None:
+    def _begin_block(self, encoder: RowEncoder) -> "_Block":
+        block = self._blocks[encoder] = _Block(encoder)
+        return block
+
+    def _take(self, encoder: RowEncoder, block: "_Block") -> None:
         self._append_queued()
-        rows, self._waiting[encoder] = self._waiting[encoder], []
-        self._keep(encoder, b"".join(starmap(encoder.pack.pack, rows)))
+        used, block.used = block.used, 0
+        self._keep(encoder, memoryview(block.memory)[:used])
 
     def _append_queued(self) -> None:
         queued, self._queued = self._queued, []
         if queued:
             self.append(messages.SYNC + b"".join(queued))
 
-    def _keep(self, encoder: RowEncoder, rows: bytes) -> None:
-        self.append(_encoded(encoder, _table(encoder, rows)))
+    def _keep(self, encoder: RowEncoder, rows: memoryview) -> None:
+        if isinstance(encoder, Topic):
+            encoded = bytes(rows)
+        else:
+            table = np.frombuffer(rows).reshape(-1, encoder.pack.size // 8)
+            with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a single float
+                encoded = encoder.encode(table)
+        self.append(messages.SYNC + encoded)
+
+
+class _Block:
+    """Rows that wait, encoded: kept as objects they would spread over the caches."""
+
+    __slots__ = ("head_bytes", "memory", "pack_into", "row_bytes", "used")
+
+    def __init__(self, encoder: RowEncoder) -> None:
+        row = encoder.head + bytes(encoder.pack.size)
+        self.pack_into, self.head_bytes, self.row_bytes = encoder.pack.pack_into, len(encoder.head), len(row)
+        self.memory, self.used = bytearray(row * encoder.block_rows), 0
 
 
 class FileLog(TopicLog):
@@ -119,31 +148,26 @@ class MemoryLog(TopicLog):
         self._rows: dict[Topic, bytearray] = {topic: bytearray() for topic in FLIGHT_TOPICS}
 
     def blocks(self, topic: Topic) -> Iterator[Array]:
-        self.flush()
-        rows = self._rows[topic]
-        step = ROWS_AT_ONCE * topic.pack.size
-        for begin in range(0, len(rows), step):
-            yield _table(topic, bytes(rows[begin : begin + step]))
+        for rows in self._chunks(topic):
+            yield topic.decode(np.frombuffer(rows, topic.layout))
 
     def encoded(self) -> Iterator[bytes]:
         self.flush()
         yield self._beginning
         yield bytes(self._messages)
         for topic in FLIGHT_TOPICS:
-            for rows in self.blocks(topic):
-                yield _encoded(topic, rows)
+            for rows in self._chunks(topic):
+                yield messages.SYNC + rows
 
-    def _keep(self, encoder: RowEncoder, rows: bytes) -> None:
+    def _chunks(self, topic: Topic) -> Iterator[bytes]:
+        self.flush()
+        rows = self._rows[topic]
+        step = ROWS_AT_ONCE * topic.layout.itemsize
+        for begin in range(0, len(rows), step):
+            yield bytes(rows[begin : begin + step])
+
+    def _keep(self, encoder: RowEncoder, rows: memoryview) -> None:
         if isinstance(encoder, Topic):
             self._rows[encoder] += rows
         else:
             super()._keep(encoder, rows)
-
-
-def _encoded(encoder: RowEncoder, table: Array) -> bytes:
-    with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a single float
-        return messages.SYNC + encoder.encode(table)
-
-
-def _table(encoder: RowEncoder, rows: bytes) -> Array:
-    return np.frombuffer(rows).reshape(-1, encoder.pack.size // 8)

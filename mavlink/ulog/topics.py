@@ -69,7 +69,11 @@ def record(topic: str, *numbers: float) -> bytes:
 
 @cache
 def _packer(topic: str) -> Callable[..., bytes]:
-    return Struct("<H" + "".join(code * count for _, code, count in _fields(TOPICS[topic]))).pack
+    return row_layout(TOPICS[topic], "H").pack
+
+
+def row_layout(fields: str, first: str = "") -> Struct:
+    return Struct("<" + first + "".join(code * count for _, code, count in _fields(fields)))
 
 
 def _fields(text: str) -> list[tuple[str, str, int]]:

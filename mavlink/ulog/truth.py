@@ -37,7 +37,7 @@ class TruthBlocks(Blocks):
 
     def encode(self, table: Array) -> bytes:
         count, records, turned = len(table), self._records, _turned(table)
-        time_us = np.rint(1e6 * table[:, :1])
+        time_us = table[:, :1]
         for topic in (topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS):
             records[topic, "timestamp"][:count] = time_us
         records[topics.ATTITUDE_TRUTH, "q"][:count] = attitude_ned(table[:, 10:14])
@@ -52,15 +52,16 @@ class TruthBlocks(Blocks):
         escs["esc_rpm"][:, : rpm.shape[1], 0] = np.rint(rpm)
         return records.first(count) + self._battery(*table[-1, [0, 18, 19]].tolist())
 
-    def _battery(self, time_s: float, voltage_v: float, charge_ah: float) -> bytes:
+    def _battery(self, time_us: float, voltage_v: float, charge_ah: float) -> bytes:
         if not self._capacity_ah:
             return b""
+        time_s = time_us / 1e6
         elapsed_s, used_ah = time_s - self._charge_s, charge_ah - self._charge_ah
         self._charge_s, self._charge_ah = time_s, charge_ah
         current_a = _S_PER_H * used_ah / elapsed_s if elapsed_s > 0.0 else _UNKNOWN
         remaining = min(max(1.0 - charge_ah / self._capacity_ah, 0.0), 1.0)
         known = (0.0 if isnan(voltage_v) else voltage_v, current_a, 1e3 * charge_ah, remaining, nan)
-        return record(topics.BATTERY, round(1e6 * time_s), *known, True, 0, _NO_WARNING)
+        return record(topics.BATTERY, int(time_us), *known, True, 0, _NO_WARNING)
 
 
 def _rotated(attitude: Array, vector: Array) -> tuple[Array, Array, Array]:

@@ -94,10 +94,10 @@ class TruthLog:
     def write_world(self, world: World) -> None:
         time_us, state, rotors, charge_ah, voltage_v, wind, _ = world
         speeds, others = split(rotors)
-        row = (time_us / 1e6, *state, *speeds, voltage_v, charge_ah, *wind)
+        row = (time_us, *state, *speeds, voltage_v, charge_ah, *wind)
         self._log.add(TRUTH, row)
         if others:
-            self._log.add(MORE_TRUTH, (row[0], *others))
+            self._log.add(MORE_TRUTH, (time_us, *others))
         if self._blocks and self._thinning.is_due(time_us):
             self._log.add(self._blocks, (*row, *others))
 

@@ -30,7 +30,8 @@ def rows_of(topic: Topic, count: int = ROWS) -> Array:
 def fill(log: TopicLog) -> None:
     for number in range(ROWS):
         for topic in FLIGHT_TOPICS:
-            log.add(topic, rows_of(topic)[number].tolist())
+            _, *numbers = rows_of(topic)[number].tolist()
+            log.add(topic, (4000 * number, *(int(each) if each.is_integer() else each for each in numbers)))
     log.append(encode_input(0, RecordKind.SETUP, b"{}"))
     log.close()
 
@@ -71,6 +72,15 @@ def test_what_a_law_does_not_report_stays_not_a_number() -> None:
     row[0, unknown] = np.nan
     row[0, DECISION.names.index("fallback")] = -1.0
     assert np.array_equal(DECISION.decode(np.frombuffer(DECISION.encode(row), DECISION.layout)), row, equal_nan=True)
+
+
+@pytest.mark.parametrize(("given", "kept"), [(1e300, np.inf), (70_000, 70_000.0), (-1e300, -np.inf)])
+def test_numbers_beyond_the_range_of_a_column_are_kept_as_its_type_can(given: float, kept: float) -> None:
+    log = MemoryLog()
+    row = dict.fromkeys(DECISION.names, 0.0) | {"t": 8000, "delay_us": given, "active_rates": 70_000, "cost": given}
+    log.add(DECISION, tuple(row.values()))
+    found_row = dict(zip(DECISION.names, found(log, DECISION)[0].tolist(), strict=True))
+    assert found_row == row | {"t": 0.008, "delay_us": kept, "active_rates": 70_000 % 2**16}
 
 
 @given(content=st.binary(max_size=3 * CHUNK_BYTES))

@@ -129,7 +129,7 @@ def test_the_truth_is_in_ned_and_frd() -> None:
     blocks = truth.TruthBlocks(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0)
     east = dict.fromkeys(TRUTH.names, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
     east |= {"x": 1.0, "y": 2.0, "z": 3.0, "omega2": 5000.0, "voltage_v": 12.0}
-    rows = [east | {"t": 0.004 * number, "charge_ah": 0.001 * number} for number in range(2 * BLOCK_ROWS + 3)]
+    rows = [east | {"t": 4000.0 * number, "charge_ah": 0.001 * number} for number in range(2 * BLOCK_ROWS + 3)]
     log = read(encoded(blocks, *(list(row.values()) for row in rows)))
     position = data(log, topics.POSITION_TRUTH)
     assert position["timestamp"].tolist() == [4000 * number for number in range(len(rows))]
