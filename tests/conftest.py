@@ -17,8 +17,9 @@ settings.load_profile("same-verdict")
 gc.set_threshold(20_000, 20, 20)
 use_one_thread()  # before numpy is loaded: two workers have a core each
 
-# A shell's background job ignores Ctrl-C, and so would every process that a test starts.
+# A shell's background job ignores Ctrl-C, one of nohup hang-ups, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_finish() -> None:
