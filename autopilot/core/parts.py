@@ -35,8 +35,8 @@ from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import WARNING
 from colibri.plant.vehicle.description import Vehicle
 
-_LOADED = set[str]()
-"""Control laws whose compiled code was loaded by a trial."""
+_LOADED = set[tuple[str, str, int, bool]]()
+"""Whose compiled code was loaded by a trial: law, profile, number of rotors, and whether they are flat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +109,8 @@ def parts_of(
     tuning = Retuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
     if values:
         tuning.try_all(parameters.values)
-    elif profile.controller not in _LOADED:  # what a change in flight needs
-        _LOADED.add(profile.controller)
+    elif (kind := (profile.controller, profile.where, vehicle.rotors.count, vehicle.is_flat)) not in _LOADED:
+        _LOADED.add(kind)  # what a change in flight needs
         with suppress(ImpossibleError):
             tuning.try_all(parameters.values)
     parameters.ask(tuning.prepare, tuning.is_ready)
