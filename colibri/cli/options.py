@@ -1,12 +1,12 @@
 """The options of each subcommand, in a function of its name."""
 
-from argparse import SUPPRESS, ArgumentTypeError
+from argparse import SUPPRESS
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from colibri.analysis.limits import NONE_LOST, LossLimit, limit, loss_limit
-from colibri.common.process.arguments import ArgumentParser, natural, positive
+from colibri.common.process.arguments import ArgumentParser, counting, keyword, natural, part, positive
 from colibri.common.process.arguments import seeds as seeds_of
 
 GCS = "udpout:127.0.0.1:14550"
@@ -256,7 +256,7 @@ def gym(parser: ArgumentParser) -> None:
     parser.add_argument("action", choices=["export"], help="write POLICY.toml beside a policy")
     add("policy", "POLICY.onnx", "model from observations, (1, n), to actions, (1, a)", type=Path)
     add("--env", "NAME", "environment in which it was trained", default="colibri/Hover-v0")
-    parser.several("--set", "KEY=VALUE", "keyword argument of the environment", type=_keyword)
+    parser.several("--set", "KEY=VALUE", "keyword argument of the environment", type=keyword)
 
 
 def certify(parser: ArgumentParser) -> None:
@@ -265,10 +265,10 @@ def certify(parser: ArgumentParser) -> None:
     add("--controller", "NAME", "control law with a table in the profile (default: the profile's)")
     add("--vehicle", "NAME", "vehicle name or .toml (default: the profile's)")
     add("--moment", "NM", "largest disturbance moment, N m", type=positive, default=0.01)
-    add("--charge", "PART", "largest part of the battery's charge that is used", type=_part, default=0.5)
+    add("--charge", "PART", "largest part of the battery's charge that is used", type=part, default=0.5)
     least = "smallest part of the profile's ranges with a Lyapunov function; with less the law is refused"
-    add("--least", "PART", least, type=_part, default=0.5)
-    add("--flights", "N", "number of test flights from the border of the certified set", type=_some, default=1000)
+    add("--least", "PART", least, type=part, default=0.5)
+    add("--flights", "N", "number of test flights from the border of the certified set", type=counting, default=1000)
     add("--seed", "N", "seed of the flights (default %(default)s)", type=natural, default=0)
     _out(parser, "out/certify", "certificate, table and figure")
 
@@ -380,29 +380,3 @@ def _gate(parser: ArgumentParser, lost: LossLimit | None, *, junit: bool = False
 def _out(parser: ArgumentParser, folder: str, what: str) -> None:
     parser.value("--out", "DIR", f"folder for {what}", type=Path, default=Path(folder))
     parser.flag("--quiet", "print errors only")
-
-
-def _part(text: str) -> float:
-    value = positive(text)
-    if value > 1.0:
-        raise ArgumentTypeError(f"must be a part of 1, not {text}")
-    return value
-
-
-def _some(text: str) -> int:
-    value = natural(text)
-    if value == 0:
-        raise ArgumentTypeError("must be at least 1")
-    return value
-
-
-def _keyword(text: str) -> tuple[str, Any]:
-    import msgspec
-
-    name, equals, value = text.partition("=")
-    if not equals or not name:
-        raise ArgumentTypeError(f'must be KEY=VALUE, for example "action=rates", not "{text}"')
-    try:
-        return name, msgspec.json.decode(value)
-    except msgspec.DecodeError:
-        return name, value

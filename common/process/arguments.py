@@ -1,4 +1,4 @@
-"""Command lines: one-line errors, and numeric arguments."""
+"""Command lines: one-line errors, and types of arguments."""
 
 import argparse
 import re
@@ -64,10 +64,24 @@ def positive(text: str) -> float:
     return value
 
 
+def part(text: str) -> float:
+    value = positive(text)
+    if value > 1.0:
+        raise ArgumentTypeError(f"must be a part of 1, not {text}")
+    return value
+
+
 def natural(text: str) -> int:
     value = int(text)
     if value < 0:
         raise ArgumentTypeError(f'must be at least 0, not "{text}"')
+    return value
+
+
+def counting(text: str) -> int:
+    value = natural(text)
+    if value == 0:
+        raise ArgumentTypeError("must be at least 1")
     return value
 
 
@@ -80,3 +94,15 @@ def seeds(text: str) -> range:
     if not chosen:
         raise ArgumentTypeError(f'must be FIRST-LAST, for example 1-50, not "{text}"')
     return chosen
+
+
+def keyword(text: str) -> tuple[str, Any]:
+    import msgspec
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise ArgumentTypeError(f'must be KEY=VALUE, for example "action=rates", not "{text}"')
+    try:
+        return name, msgspec.json.decode(value)
+    except msgspec.DecodeError:
+        return name, value

@@ -61,7 +61,7 @@ class Topic:
         return row_layout(self.fields)
 
     def encode(self, rows: Array) -> bytes:
-        """Encode rows with `t`; numbers beyond the range of a column become infinite, or wrap."""
+        """Encode rows, (n, columns), with `t` in s; numbers beyond the range of a column become infinite, or wrap."""
         encoded = np.zeros(len(rows), self.layout)
         encoded["size"], encoded["kind"], encoded["number"] = head(self.layout, self.number)
         encoded["timestamp"] = np.rint(rows[:, :1] * _US_PER_S)

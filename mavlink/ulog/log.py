@@ -63,7 +63,7 @@ class TopicLog:
         except (error, OverflowError):
             if not isinstance(encoder, Topic):
                 raise
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"):  # beyond the range of a column
                 encoded = encoder.encode(np.array([(row[0] / 1e6, *row[1:])]))
             block.memory[block.used : block.used + block.row_bytes] = encoded
         block.used += block.row_bytes
@@ -110,7 +110,7 @@ class TopicLog:
 
 
 class _Block:
-    """Rows that wait, encoded: kept as objects they would spread over the caches."""
+    """Memory of rows that wait, packed at once: numbers kept as objects would spread over the caches."""
 
     __slots__ = ("head_bytes", "memory", "pack_into", "row_bytes", "used")
 

@@ -73,6 +73,7 @@ def _packer(topic: str) -> Callable[..., bytes]:
 
 
 def row_layout(fields: str, first: str = "") -> Struct:
+    """Return the layout of a message's fields after `first`, in codes of `struct`."""
     return Struct("<" + first + "".join(code * count for _, code, count in _fields(fields)))
 
 

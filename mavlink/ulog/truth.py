@@ -19,7 +19,7 @@ _RATES, _POSITION = _turned.places.values()
 
 
 class TruthBlocks(Blocks):
-    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH`, if any; `capacity_ah` is 0 without a battery."""
+    """Encodes rows of `TRUTH`, time in µs, each with that of `MORE_TRUTH`; `capacity_ah` is 0 without a battery."""
 
     def __init__(self, rad_s_per_speed_unit: float, capacity_ah: float, rotors: int = ROTORS) -> None:
         more = rotors > ROTORS
