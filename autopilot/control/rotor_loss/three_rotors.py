@@ -30,7 +30,8 @@ _TILT_DEG, _MAX_TILT_DEG = 6.0, 8.0  # largest tilt for position, then for posit
 _FARTHER_DEG_M, _FAR_M, _WIND_TILT_DEG = 2.0, 1.5, 16.0  # extra tilt per metre beyond _FAR_M; largest tilt
 _WIND_RAD_S, _MAX_WIND_M_S2 = 1.5, 2.0  # bandwidth and limit of the disturbance observer
 _SETTLE_S, _SINK_M_S, _LAND_M_S, _LAND_ABOVE_M = 1.5, 1.0, 0.6, 2.0  # hover time, sink rates high and low
-_KNOCK = 0.5  # touch-down: upward acceleration in one sample near the ground, parts of gravity
+_KNOCK, _JUMP = 0.35, 0.25  # touch-down: upward impulse near the ground, parts of _LAND_M_S, and its largest sample
+_KNOCK_FADES = 0.25  # parts of gravity: a correction of the estimate, in one sample, is no knock
 _STAYS_M_S, _STAYS_S = 0.2, 1.5  # touch-down: slower than this for so long in spite of the commanded sink rate
 
 
@@ -109,7 +110,9 @@ class ThreeRotors:
     def _observe(self, state: VehicleState) -> None:
         expected = self._velocity + self._interval_s * (self._explained + self._wind)
         missed = np.array(state.velocity_enu_m_s) - expected
-        self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
+        pushed_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
+        fades_m_s = _KNOCK_FADES * self._gravity * self._interval_s
+        self._knock_m_s = max(self._knock_m_s + min(pushed_m_s, _JUMP * _LAND_M_S) - fades_m_s, 0.0)
         self._climbed_m_s = state.velocity_enu_m_s[2]
         self._velocity = expected + self._gains[0] * missed
         self._wind = np.clip(self._wind + self._gains[1] * missed, -_MAX_WIND_M_S2, _MAX_WIND_M_S2)
@@ -138,7 +141,7 @@ class ThreeRotors:
         vx, vy, vz = state.velocity_enu_m_s
         stays = abs(vz) < _STAYS_M_S if low else hypot(vx, vy, vz) < _STAYS_M_S  # on the ground it may slide
         self._held_s = self._held_s + self._interval_s if sinks and stays else 0.0
-        knocked = low and sinks and self._knock_m_s > _KNOCK * self._gravity * self._interval_s
+        knocked = low and sinks and self._knock_m_s > _KNOCK * _LAND_M_S
         self.landed = self.landed or knocked or self._held_s >= _STAYS_S
 
 

@@ -51,6 +51,23 @@ def test_it_lands_on_sensors(sitl: Sitl) -> None:
     fall(sitl, 3)
 
 
+ALSO = [pytest.param(kind, marks=pytest.mark.long) for kind in ("off", "wrong", "slow", "garbage")]
+
+
+@pytest.mark.parametrize("kind", ["stuck", *ALSO])
+@pytest.mark.sitl(feedback="sensors", seed=2, wind="5@90")
+def test_it_lands_without_an_accelerometer(sitl: Sitl, kind: str) -> None:
+    sitl.takeoff(5.0)
+    sitl.inject("motor", "off", 3)
+    sitl.run(0.5)
+    sitl.inject("accel", kind)
+    sitl.wait_until(lambda: not (sitl.armed and sitl.position[2] > 0.01), within=20.0)
+    assert sitl.position[2] < 0.1
+    assert -sitl.velocity[2] < 1.2
+    sitl.wait_until(lambda: not sitl.armed, within=10.0)
+    assert sitl.said("Disarmed by landing")
+
+
 @HIGH
 @pytest.mark.sitl(controller="geometric-se3")
 def test_any_control_law_may_have_flown_before(sitl: Sitl) -> None:
