@@ -25,6 +25,7 @@ HARD_M_S, HARD_UP = 3.0, 0.5  # speed, and cosine of the tilt, beyond which a co
 HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its contact
 KNOCK_SAMPLES = 6
 _KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0  # velocity change within so many samples, and acceleration, of a contact alone
+_SCRAPES_M, _SCRAPES_US = 0.1, 500_000
 HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0  # missing height after a fall, and largest distance from the last standing place
 _JOLTED_S = 0.08  # impulse of a descent that the ground ends, in seconds of weight
 _PUSHED = 0.5  # moment of feet, in parts of a quarter of the weight at a rotor; in the air below 0.15
@@ -102,6 +103,21 @@ class Held(NamedTuple):
     def is_long(self, now_us: int) -> bool:
         """Whether only the ground can hold the vehicle, even if it rocks on an edge."""
         return self.since_us is not None and now_us - self.since_us >= _HELD_US
+
+
+class Scrape(NamedTuple):
+    """Start of a fast motion along the ground, without a knock, though the vehicle should be well above."""
+
+    since_us: int | None = None
+
+    def after(self, now_us: int, wanted_m: float, state: VehicleState, ground_m: float) -> "Scrape":
+        close = abs(state.position_enu_m[2] - ground_m) < _SCRAPES_M and is_held_down(wanted_m, state, ground_m)
+        if not close or hypot(*state.velocity_enu_m_s) <= HARD_M_S:
+            return Scrape()
+        return Scrape(now_us) if self.since_us is None else self
+
+    def is_long(self, now_us: int) -> bool:
+        return self.since_us is not None and now_us - self.since_us >= _SCRAPES_US
 
 
 class Motion(NamedTuple):

@@ -1,6 +1,7 @@
 """Ground contact, and the times of arming, take-off and landing."""
 
 from collections import deque
+from math import hypot
 from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Event
@@ -8,6 +9,7 @@ from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import (
+    HARD_WITHIN_US,
     KNOCK_SAMPLES,
     SUSPECTED_S,
     Hardest,
@@ -15,6 +17,7 @@ from colibri.autopilot.guidance.landing_detector import (
     Lack,
     Landing,
     Motion,
+    Scrape,
     is_clear,
     is_far_below,
     is_held_down,
@@ -55,7 +58,7 @@ class GroundContact:
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self._landing = Landing()
-        self._lack, self._hardest, self._held = Lack(), Hardest(), Held()
+        self._lack, self._hardest, self._held, self._scrape = Lack(), Hardest(), Held(), Scrape()
         self._motions: deque[Motion] = deque(maxlen=KNOCK_SAMPLES)
         self.impact = ""
         self.drifts = False
@@ -91,6 +94,7 @@ class GroundContact:
     def take_off(self, now_us: int) -> None:
         self.standing = False
         self._landing, self._lack, self._hardest, self._held = Landing(), Lack(), Hardest(), Held()
+        self._scrape = Scrape()
         self._motions.clear()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "Takeoff detected")
@@ -119,6 +123,10 @@ class GroundContact:
             self._landing, now_us, vehicle, sinks or fell, drifts=drifts, slides=is_far_below(wanted_m, vehicle)
         )
         self._held = self._held.after(now_us, wanted_m, vehicle)
+        self._scrape = self._scrape.after(now_us, wanted_m, vehicle, self.height_m)
+        if self._scrape.is_long(now_us):
+            self._lines.say(CRITICAL, f"Impact at {hypot(*vehicle.velocity_enu_m_s):.1f} m/s")
+            self._scrape = Scrape(now_us + HARD_WITHIN_US)
         if stands or self._held.is_long(now_us):
             self.land(now_us)
         return stands and fell

@@ -3,7 +3,7 @@
 import pytest
 
 from colibri.autopilot.control.interface import AT_REST
-from colibri.autopilot.guidance.landing_detector import Held, Lack, is_touching
+from colibri.autopilot.guidance.landing_detector import Held, Lack, Scrape, is_touching
 
 _INTERVAL_S = 0.01
 
@@ -49,3 +49,17 @@ def test_a_vehicle_that_rocks_above_a_sinking_reference_stands(wanted_m: float, 
         rocks_m = 0.1 * (sample % 3) + climb_m_s * sample * _INTERVAL_S
         held = held.after(sample * 10_000, wanted_m, AT_REST._replace(position_enu_m=(0.0, 0.0, rocks_m)))
     assert held.is_long(5_200_000) is holds
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "height_m", "wanted_m", "scrapes"),
+    [(5.0, 0.05, 3.0, True), (5.0, 0.05, 0.1, False), (5.0, 0.5, 3.0, False), (2.0, 0.05, 3.0, False)],
+)
+def test_only_a_fast_vehicle_that_should_be_higher_scrapes(
+    speed_m_s: float, height_m: float, wanted_m: float, scrapes: bool
+) -> None:
+    scrape, state = Scrape(), AT_REST._replace(position_enu_m=(0.0, 0.0, height_m))
+    for sample in range(60):
+        moving = state._replace(velocity_enu_m_s=(speed_m_s, 0.0, 0.1 * (sample % 3 - 1)))
+        scrape = scrape.after(sample * 10_000, wanted_m, moving, 0.0)
+    assert scrape.is_long(600_000) is scrapes
