@@ -347,6 +347,13 @@ class Pilot:
             self._stop_rotors(event, self._end(event))
         return RESTS
 
+    @property
+    def _stays_down(self) -> str:
+        """Reason why an armed vehicle that has landed must not take off again."""
+        ground = self.ground
+        landed = ground.standing and ground.times.landing_us > ground.times.armed_us
+        return self.readiness.inputs.not_known if landed else ""
+
     def _end(self, event: Event) -> str:
         return _IMPACT if event is Event.TOUCHED_DOWN and self.ground.impact else _TEXTS[event]
 
@@ -372,9 +379,9 @@ class Pilot:
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, missing: Mapping[Need, str] = NOTHING_MISSING
     ) -> Refusal | None:
-        only_lands = self.readiness.only_lands
-        if event is Event.SELECT and self.state.armed and only_lands:
-            return Refusal(f"{selected} refused: {only_lands}")
+        why = self.readiness.only_lands or self._stays_down
+        if event is Event.SELECT and self.state.armed and why:
+            return Refusal(f"{selected} refused: {why}")
         after = next_state(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after

@@ -139,6 +139,18 @@ def test_a_landing_without_gyroscope_ends_upright(hovering: Hovering) -> None:
     assert sitl.tilt_deg < 5.0
 
 
+@ON_SENSORS
+@pytest.mark.sitl(params={"COM_DISARM_LAND": 5.0})
+def test_without_gyroscope_a_landed_vehicle_stays_down(sitl: Sitl) -> None:
+    sitl.takeoff(2.0)
+    sitl.inject("gyro", "off")
+    sitl.wait_until(lambda: sitl.said("Landing detected"), within=20.0)
+    refused(sitl, "hold refused: inertial sensors failed", sitl.select, Mode.HOLD)
+    refused(sitl, "track refused: inertial sensors failed", sitl.fly_track, "circle")
+    sitl.wait_until(lambda: not sitl.armed, within=10.0)
+    assert not sitl.said("Impact")
+
+
 @pytest.mark.parametrize(("kind", "late_s"), [("stuck", 0.0), ("delayed", 0.03)])
 def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(hovering: Hovering, kind: str, late_s: float) -> None:
     sitl = hovering("7@188", 5.0)
