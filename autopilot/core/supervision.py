@@ -69,9 +69,12 @@ class Supervision:
             self._caught_us = None
 
     def _execute(self, now_us: int, state: VehicleState) -> None:
-        action = self._parts.supervisor.step(self._inputs(now_us, state), self._parts.pilot.flight)
+        supervisor, pilot = self._parts.supervisor, self._parts.pilot
+        action = supervisor.step(self._inputs(now_us, state), pilot.flight)
         if action is not Action.NONE:
-            self._parts.pilot.save(action)
+            pilot.save(action)
+        lands = pilot.saving is not Action.NONE and supervisor.holds(Condition.GYROSCOPE_LOST)
+        pilot.readiness.unsteady = Condition.GYROSCOPE_LOST.value if lands else ""
 
     def _sensed(self, now_us: int) -> tuple[ClientInputs, bool]:
         parts = self._parts

@@ -8,13 +8,13 @@ from colibri.mavlink.services.statustext import EMERGENCY
 
 
 class Readiness:
-    """Failures as texts, empty if none; `descends` under the last-resort law."""
+    """Failures as texts, empty if none: `unsteady` while a failsafe lands, `descends` under the last-resort law."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self.inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
         self.further: Callable[[], Iterable[str]] | None = None  # reasons of an identity's own checks
-        self.rotor_failed = self.error = ""
+        self.rotor_failed = self.error = self.unsteady = ""
         self.descends = self._lands = False
 
     def refusals(self) -> list[str]:
@@ -28,7 +28,7 @@ class Readiness:
     @property
     def only_lands(self) -> str:
         """Reason why only landing is possible."""
-        return (self.rotor_failed if self._lands else "") or (self.error if self.descends else "")
+        return (self.rotor_failed if self._lands else "") or (self.error if self.descends else "") or self.unsteady
 
     def fail(self, error: str) -> None:
         self.error = self.error or error

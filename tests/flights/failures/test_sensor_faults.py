@@ -140,13 +140,19 @@ def test_a_landing_without_gyroscope_ends_upright(hovering: Hovering) -> None:
 
 
 @ON_SENSORS
+@pytest.mark.parametrize(
+    ("unit", "why"), [("gyro", "gyroscope lost"), ("accel", "inertial sensors failed")], ids=["gyro", "accel"]
+)
 @pytest.mark.sitl(params={"COM_DISARM_LAND": 5.0})
-def test_without_gyroscope_a_landed_vehicle_stays_down(sitl: Sitl) -> None:
+def test_without_an_inertial_sensor_a_landed_vehicle_stays_down(sitl: Sitl, unit: str, why: str) -> None:
     sitl.takeoff(2.0)
-    sitl.inject("gyro", "off")
+    sitl.inject(unit, "off")
+    sitl.run(1.0)
+    if unit == "gyro":
+        refused(sitl, f"hold refused: {why}", sitl.select, Mode.HOLD)
     sitl.wait_until(lambda: sitl.said("Landing detected"), within=20.0)
-    refused(sitl, "hold refused: inertial sensors failed", sitl.select, Mode.HOLD)
-    refused(sitl, "track refused: inertial sensors failed", sitl.fly_track, "circle")
+    refused(sitl, f"hold refused: {why}", sitl.select, Mode.HOLD)
+    refused(sitl, f"track refused: {why}", sitl.fly_track, "circle")
     sitl.wait_until(lambda: not sitl.armed, within=10.0)
     assert not sitl.said("Impact")
 
