@@ -1,5 +1,7 @@
 """The magnetometer: the earth's field plus the vehicle's own."""
 
+from collections import deque
+from collections.abc import Sequence
 from math import hypot, radians
 
 import numpy as np
@@ -7,6 +9,7 @@ import numpy as np
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import ATTITUDE, GYRO_BIAS, HARD_IRON
 from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, MeasurementKind, Ratio, Value
+from colibri.autopilot.estimation.sensing.field_lag import FieldLag
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.elementary import square
@@ -25,6 +28,10 @@ _MEAN_S = 1.0
 _DRIFT_SIGMAS, _DRIFT_GAUSS = 8.0, 0.004  # the mean strength has drifted if its deviation exceeds both
 _DOUBT_SIGMAS, _DOUBT_GAUSS = 20.0, 0.004  # of a mean innovation that contradicts the model; healthy: below 10
 _DOUBT_RAD_S, _DOUBT_IRON_GAUSS = 0.02, 0.1  # what gyroscope bias and own field may then have become
+
+_KEEPS_US, _BIASES = 1_000_000, 3  # biases kept: those of 2 to 3 s ago are from before a late field was seen
+_LATE_RAD = 0.05  # attitude error by then
+_NEVER = -1.0  # gate of a measurement that is only predicted
 
 
 class MagnetometerFusion(FusedInstrument):
@@ -50,6 +57,10 @@ class MagnetometerFusion(FusedInstrument):
         self._mean: Vector = (0.0, 0.0, 0.0)  # of the innovations, gauss
         self._mean_us = 0
         self.doubt_from_us = 0
+        self._lag = FieldLag(self.variance)
+        self._biases: deque[Array] = deque(maxlen=_BIASES)  # the filter's gyroscope biases, rad/s, one each second
+        self._kept_us = 0
+        self._innovation = np.zeros(self.numbers)
         self.misled = False  # whether the attitude has followed a drift
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
@@ -61,6 +72,11 @@ class MagnetometerFusion(FusedInstrument):
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         measured = np.array(value)
+        if self._lag.late:
+            update.fuse_field(x, P, measured, self._field, self.variance, _NEVER, self._innovation)
+            self._compare(value, self._innovation.tolist(), time_us)
+            self.kind.reject(time_us)
+            return Reason.FIELD
         is_of_earth = update.is_of_earth(x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
         part = min((time_us - self._mean_us) * 1e-6 / _MEAN_S, 1.0)
         self._mean_us = time_us
@@ -71,11 +87,28 @@ class MagnetometerFusion(FusedInstrument):
         resets = self.kind.resets
         take = self.kind.force_accept if drifts else self.kind.fuse
         accepted = take(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
+        self._compare(value, self.kind.test.innovation, time_us)
+        if self._lag.late:
+            self._doubt_gyroscope(x, P)
+        elif time_us >= self._kept_us + _KEEPS_US:
+            self._kept_us = time_us
+            self._biases.append(x[10:13].copy())
         if self.kind.resets != resets:
             self._deviation_gauss, self._mean = 0.0, (0.0, 0.0, 0.0)
         elif accepted and time_us >= self.doubt_from_us:
             self._doubt(P, part)
         return None if accepted else Reason.INNOVATION
+
+    def _compare(self, value: Value, innovation: Sequence[float], time_us: int) -> None:
+        (x, y, z), (a, b, c) = value, innovation
+        self._lag.add((x, y, z), (x - a, y - b, z - c), time_us)
+
+    def _doubt_gyroscope(self, x: Array, P: Array) -> None:
+        """Return to the gyroscope bias from before the field came late."""
+        x[10:13] = self._biases[0] if self._biases else x[10:13]
+        self._biases.clear()
+        update.inflate_covariance(P, ATTITUDE, 3, square(_LATE_RAD))
+        update.inflate_covariance(P, GYRO_BIAS, 3, square(_DOUBT_RAD_S))
 
     def _drifts(self, x: Array, P: Array, value: Value, part: float) -> bool:
         own_x, own_y, own_z = x[-3:].tolist()

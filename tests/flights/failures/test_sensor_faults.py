@@ -139,6 +139,23 @@ def test_a_landing_without_gyroscope_ends_upright(hovering: Hovering) -> None:
     assert sitl.tilt_deg < 5.0
 
 
+@pytest.mark.parametrize("delay_s", [0.2, *(pytest.param(delay_s, marks=pytest.mark.long) for delay_s in (0.1, 0.4))])
+@pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="5@90", seed=1, strict=False)
+def test_a_magnetometer_that_comes_late_is_not_followed(sitl: Sitl, delay_s: float) -> None:
+    sitl.takeoff(5.0)
+    sitl.inject("mag", "delayed", 1, delay_s)
+    sitl.run(2.0)
+    for place in ((10.0, 5.0, 6.0), (-5.0, -8.0, 8.0), (12.0, -4.0, 5.0)):
+        sitl.goto(*place, wait=False)
+        sitl.run(5.0)
+        assert sitl.tilt_deg < 50.0
+    assert sitl.said("magnetometer lost")
+    sitl.select(Mode.LAND)
+    sitl.wait_until(lambda: not sitl.armed, within=30.0)
+    assert sitl.tilt_deg < 10.0
+    assert not sitl.said("Impact")
+
+
 @ON_SENSORS
 @pytest.mark.parametrize(
     ("unit", "why"), [("gyro", "gyroscope lost"), ("accel", "inertial sensors failed")], ids=["gyro", "accel"]

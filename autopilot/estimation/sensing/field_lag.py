@@ -1,0 +1,68 @@
+"""A magnetic field that comes late: it varies as the attitude predicted some time before, until it varies as now.
+
+Turns to and fro then make innovations that a filter takes for a bias of the gyroscope. Slow changes are left out: with
+a bias, too, the prediction of a steady turn leads.
+"""
+
+from collections import deque
+
+from colibri.common.types import Vector
+
+_EVERY_US = 25_000
+_LAGS = (2, 4, 6, 8, 12, 16, 20, 24)  # in samples: 0.05 to 0.6 s
+_SLOW, _PART = 0.1, 0.025  # filter gains of means, over 0.25 s, and of variances about them, over 1 s
+_LARGE = 36.0  # least variance of the error, in those of an axis
+_TURNS, _FITS = 0.25, 0.35  # in parts of it: least variance of the field, and largest of the error at the right lag
+_WORSE = 1.25  # than at the right lag the field must fit at the longest: a wrong attitude may improve with the lag
+_TURNS_AGAIN, _FITS_AGAIN = 2.0, 0.5  # of a field on time again: least variance, in parts of _LARGE, largest error
+_NOTHING: Vector = (0.0, 0.0, 0.0)
+
+
+class FieldLag:
+    """Compares a field with its predictions of now and before; `variance` of an axis in gauss².
+
+    Attributes:
+        late: Whether the field comes late.
+    """
+
+    def __init__(self, variance: float) -> None:
+        self._large = _LARGE * variance
+        self._next_us = 0
+        self.late = False
+        self._predicted: deque[Vector] = deque(maxlen=_LAGS[-1])
+        self._measured, self._now, self._before = _Spread(), _Spread(), [_Spread() for _ in _LAGS]
+
+    def add(self, measured: Vector, predicted: Vector, time_us: int) -> None:
+        """Add a field and its prediction, gauss FLU."""
+        if time_us < self._next_us:
+            return
+        self._next_us = time_us + _EVERY_US
+        known = self._predicted
+        if len(known) == _LAGS[-1]:
+            self._measured.add(measured, _NOTHING)
+            self._now.add(measured, predicted)
+            for spread, lag in zip(self._before, _LAGS, strict=True):
+                spread.add(measured, known[-lag])
+        known.append(predicted)
+        error, turns, at_lags = self._now.variance, self._measured.variance, [each.variance for each in self._before]
+        least = min(at_lags)
+        if self.late:
+            self.late = error > self._large or turns < _TURNS_AGAIN * self._large or error > _FITS_AGAIN * least
+        elif error > self._large and turns > _TURNS * error:
+            self.late = least < _FITS * error and at_lags[-1] > _WORSE * least
+
+
+class _Spread:
+    """Slow mean of the differences of two vectors, and their variance about it."""
+
+    def __init__(self) -> None:
+        self._mean: Vector | None = None
+        self.variance = 0.0
+
+    def add(self, one: Vector, other: Vector) -> None:
+        (x, y, z), (a, b, c) = one, other
+        x, y, z = x - a, y - b, z - c
+        mx, my, mz = self._mean or (x, y, z)
+        dx, dy, dz = x - mx, y - my, z - mz
+        self._mean = (mx + _SLOW * dx, my + _SLOW * dy, mz + _SLOW * dz)
+        self.variance += _PART * (dx * dx + dy * dy + dz * dz - self.variance)
