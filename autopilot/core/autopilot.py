@@ -50,6 +50,9 @@ class Stages(Protocol):
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
 
+    def repeat(self, now_us: int, /) -> ActuatorCommand | None:
+        """Enter a frame between two control samples by its time alone; None if its content matters."""
+
     def wait(self, now_us: int, /) -> None: ...
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
@@ -119,6 +122,16 @@ class Autopilot(Generic[StagesT]):
             stages.sampled(flown, duration_s)
         faults, delay_us = stages.faults(), stages.delay.delay_us
         return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
+
+    def repeat(self, now_us: int) -> Step | None:
+        """Answer a frame between two control samples without its content; None if that matters."""
+        stages = self.stages
+        before_us = stages.time_us
+        continues = before_us is not None and 0 < now_us - before_us <= self._longest_us
+        if not continues or stages.loop.is_due(now_us):
+            return None
+        command = stages.repeat(now_us)
+        return None if command is None else Step(command, None, 0.0, delay_us=stages.delay.delay_us)
 
     def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
         return self.stages.serve(inbox)

@@ -114,6 +114,9 @@ class Copter:
             self.loop.know_charge(battery.used_ah)
         self.parts.battery.receive(battery)
 
+    def repeat(self, _now_us: int) -> ActuatorCommand | None:
+        return None
+
     def wait(self, now_us: int) -> None:
         """Deny commands before the first estimate; after a flight, prepare the next one."""
         self.waiting_us = now_us

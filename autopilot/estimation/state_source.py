@@ -54,6 +54,10 @@ class StateSource:
         return fix
 
     @property
+    def estimates(self) -> bool:
+        return self._make is not None
+
+    @property
     def rests(self) -> bool:
         return self.estimate is not None and self._estimating is not None and not self._estimating.caught
 

@@ -128,7 +128,13 @@ class InMemory:
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         now_us = plant.world.time_us
-        frame, plant_status = plant.measure(with_battery=now_us % BATTERY_EVERY_US == 0)
+        with_battery = now_us % BATTERY_EVERY_US == 0
+        if not (with_battery or plant.has_news or self._traffic):
+            repeated = autopilot.repeat(now_us)
+            if repeated is not None:
+                self._uncounted += 1
+                return repeated, self._as_received(repeated.command), (), b""
+        frame, plant_status = plant.measure(with_battery=with_battery)
         received, datagram = None, b""
         if plant_status is NOTHING and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
             received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)

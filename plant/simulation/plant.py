@@ -126,10 +126,15 @@ class Plant:
         self._repeated, self._repeats_after = False, {False: False, True: False}
         self._foreseen: World | None = None
 
+    @property
+    def has_news(self) -> bool:
+        """Whether a frame without battery has a status, too."""
+        return bool(self._results or self._actuation.delay_us)
+
     def measure(self, *, with_battery: bool = True) -> tuple[Frame, PlantStatus]:
         battery = self._physics.battery(self.world) if with_battery else None
         delay_us = self._actuation.delay_us or None
-        alone = battery is None and delay_us is None and not self._results
+        alone = battery is None and not self.has_news
         status = NOTHING if alone else PlantStatus(battery, self._results, delay_us)
         return self._measure(self.world), status
 
