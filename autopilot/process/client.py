@@ -5,7 +5,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVarTuple
 
 from colibri.autopilot.core.autopilot import Autopilot
-from colibri.autopilot.core.step import Step, answer
+from colibri.autopilot.core.step import Step, answer, answer_ahead
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
@@ -59,7 +59,8 @@ class PlantClient:
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            step = answer(self._end, autopilot.step, received[0], perf_counter()) if received else None
+            steps = self._answered(autopilot, received[0]) if received else []
+            step = steps[0] if steps else None
             self._send()
             due_s = self._end.poll(perf_counter())
             self._send()
@@ -70,6 +71,8 @@ class PlantClient:
                 self._report_if_unknown(step)
                 datagram = received[0] if received and isinstance(self._end, AutopilotEnd) else None
                 self._keep(AutopilotLog.write, step, datagram)
+                for repeated in steps[1:]:
+                    self._keep(AutopilotLog.write, repeated, b"")
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
@@ -79,6 +82,14 @@ class PlantClient:
                 self._status.say("said", note)
         self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
+
+    def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> list[Step]:
+        """Answer a datagram: its frame, and without ground stations also those that need no more than their time."""
+        now_s, end = perf_counter(), self._end
+        if self._ground is None and isinstance(end, AutopilotEnd):
+            return answer_ahead(end, autopilot.step, autopilot.repeat, autopilot.frame_interval_us, datagram, now_s)
+        step = answer(end, autopilot.step, datagram, now_s)
+        return [] if step is None else [step]
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
         """Write to the log, whose failure ends only flights without ground stations."""

@@ -6,6 +6,10 @@ The plant sends the frame of time t and advances only with the command that name
 - a repeated frame gets the remembered answer, so each frame is computed once;
 - messages of a time other than the awaited one are dropped.
 
+Between two control samples the command stays, and the state is not needed. An autopilot without ground stations
+therefore answers a control sample with the commands of all frames up to the next one, in one datagram, and the plant
+advances through these frames without sending those that hold only a state.
+
 The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (ATTITUDE_QUATERNION for state frames, HIL_SENSOR
 for sensor frames) and a HEARTBEAT. The plant begins with the first such call, and resumes with a restarted autopilot.
 

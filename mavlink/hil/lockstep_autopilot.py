@@ -31,10 +31,13 @@ class AutopilotEnd(AnsweringEnd):
         self._made_of = lockstep.MADE_OF[feedback]
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._runs_freely: bool | None = None
+        self._is_plain = False  # whether the last frame came alone
+        self._answered_us: frozenset[int] = frozenset()  # times of the commands in the last answer
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Return the datagram's frame if it is the next one to compute."""
         frame = self._read(datagram, self._plant_bytes)
+        self._is_plain = frame is not None
         if frame is None:
             return self._receive_any(datagram, now_s)
         following = self._next(frame, now_s)
@@ -77,15 +80,31 @@ class AutopilotEnd(AnsweringEnd):
         self._time_us = time_us
         self._codec.skip(answers)
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
+    def answer(
+        self,
+        command: ActuatorCommand,
+        faults: Sequence[Fault | WorldChange] = (),
+        ahead: Sequence[ActuatorCommand] = (),
+    ) -> None:
+        """Answer the last frame, and with `ahead` the next ones, which then are not returned."""
         answer = encode_actuators(self._codec, command)
         for fault in faults:
             encode = encode_fault if isinstance(fault, Fault) else encode_change
             answer += encode(self._codec, fault, self._plant)  # type: ignore[arg-type]
         if command.time_us % lockstep.HEARTBEAT_EVERY_US == 0:
             answer += self._heartbeat(command.armed)
+        for coming in ahead:
+            answer += encode_actuators(self._codec, coming)
+        if ahead:
+            self._time_us = ahead[-1].time_us
+            self._answered_us = frozenset((command.time_us, *(coming.time_us for coming in ahead)))
         self._answer = answer
         self._outbox.append(answer)
+
+    def may_answer_ahead(self, time_us: int) -> bool:
+        """Whether the plant waits with the frame of a coming time, which holds nothing but a state."""
+        holds_more = time_us % lockstep.BATTERY_EVERY_US == 0 or time_us % lockstep.HEARTBEAT_EVERY_US == 0
+        return self._is_plain and self._runs_freely is False and not holds_more
 
     def poll(self, now_s: float) -> float:
         if self.silence_s(now_s) < CALL_AFTER_S:
@@ -105,7 +124,7 @@ class AutopilotEnd(AnsweringEnd):
         return decode_state(first, *came) if came else None
 
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
-        if frame.time_us == self._time_us:
+        if frame.time_us == self._time_us or frame.time_us in self._answered_us:
             self._received_s = now_s
             self._answer_again()
             return None
@@ -116,7 +135,7 @@ class AutopilotEnd(AnsweringEnd):
                 return None
         self._received_s = now_s
         self._time_us = frame.time_us
-        self._answer = None
+        self._answer, self._answered_us = None, frozenset()
         return frame
 
     def _follows(self, time_us: int, before_us: int) -> bool:

@@ -1,7 +1,7 @@
 """The plant's end of the lockstep protocol."""
 
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from colibri.common.types import Address
@@ -62,6 +62,7 @@ class PlantEnd:
         self._begun = False
         self._awaited_us: int | None = None
         self._answered_us: int | None = None
+        self._ahead: dict[int, ActuatorCommand] = {}  # for frames after the last one that was answered
         self._battery: PlantBattery | None = None
         self._faults: list[Fault | WorldChange] = []
         self._resend_at_s = 0.0
@@ -98,14 +99,18 @@ class PlantEnd:
         self._send_frame(now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        command = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else None
-        if command is None:
+        commands = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else []
+        if not commands:
             return self._receive_any(datagram, sender, now_s)
         self._note(datagram, now_s)
-        return self._accept(command)
+        return self._accept_first(commands)
+
+    def take_ahead(self, time_us: int) -> ActuatorCommand | None:
+        """Return the command of the next frame if it came with the last answer."""
+        return self._ahead.pop(time_us, None)
 
     def _receive_any(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        command = None
+        commands: list[ActuatorCommand | None] = []
         asked: list[Message] = []
         for message in self._codec.decode(datagram):
             if message.source != self._autopilot:
@@ -118,17 +123,18 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender, now_s)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
-                command = self._accept(state.decode_actuators(message, self._rotors)) or command
+                commands.append(state.decode_actuators(message, self._rotors))
             else:
                 self.dropped["unexpected"] += 1
                 continue
             if sender == self.peer:
                 self._note(message.frame, now_s)
+        command = self._accept_first(commands)
         for message in asked:
             self._receive_fault(message, answered=command is not None)
         return command
 
-    def skip(self, frames: int) -> None:
+    def skip(self, frames: int = 1) -> None:
         """Count frames that were not encoded, for the numbers of later ones."""
         self._codec.skip(frames * self._messages)
 
@@ -218,6 +224,16 @@ class PlantEnd:
         self._peer_received_s = now_s
         self.received.append(frame)
 
+    def _accept_first(self, commands: Sequence[ActuatorCommand | None]) -> ActuatorCommand | None:
+        """Accept the awaited command of a datagram, and those after it ahead; otherwise the newest one."""
+        accepted = None
+        for command in commands:
+            if accepted is not None and self.waits and command is not None:
+                self._ahead[command.time_us] = command
+            else:
+                accepted = self._accept(command) or accepted
+        return accepted
+
     def _accept(self, command: ActuatorCommand | None) -> ActuatorCommand | None:
         if command is None:
             self.dropped["invalid"] += 1
@@ -226,6 +242,7 @@ class PlantEnd:
             command = None
         elif self.waits:
             self._awaited_us = None
+            self._ahead.clear()
         else:
             self._answered_us = command.time_us
         return command

@@ -100,13 +100,18 @@ def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     return _within_range(time_us, tuple(array("f", controls)), armed)
 
 
-def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:
-    """Read a datagram of exactly one valid command of `source`; otherwise `None`."""
-    layout = actuator_frame(rotors)
-    if len(datagram) != layout.size:
-        return None
-    numbers = layout.read(datagram, 0, source)
-    return _command(numbers) if numbers else None
+def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> list[ActuatorCommand]:
+    """Read a datagram of nothing but valid commands of `source`; otherwise an empty list."""
+    layout, commands = actuator_frame(rotors), []
+    if len(datagram) % layout.size:
+        return []
+    for at in range(0, len(datagram), layout.size):
+        numbers = layout.read(datagram, at, source)
+        command = _command(numbers) if numbers else None
+        if command is None:
+            return []
+        commands.append(command)
+    return commands
 
 
 def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand | None:

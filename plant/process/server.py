@@ -65,6 +65,7 @@ class Server:
         self._streams_truth = streams_truth
         self._time_us = 0
         self._logged: World | None = None
+        self._passed: list[World] = []  # not logged yet
         self._ends = True
         self._progress, self._began_s = Progress(status), 0.0
         self._silence = Silence(status, SILENT_AFTER_S, "the autopilot answers again", 0.0)
@@ -83,6 +84,7 @@ class Server:
                 break
             frames += 1
         self._log_traffic([])
+        self._log_passed()
         self._log(plant.world)
         self._keep(PlantLogs.flush)
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
@@ -97,7 +99,7 @@ class Server:
     def _advance(self, plant: Plant, pace: FramePacer) -> bool:
         if isfinite(pace.speed):
             self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
-        command = self._exchange(plant)
+        command = self._ahead(plant) or self._exchange(plant)
         if command is None:
             return False
         asked = self._end.take_faults()
@@ -105,6 +107,20 @@ class Server:
             pace.change(asked, plant.world.time_us, perf_counter())
         plant.answer(command, asked)
         return True
+
+    def _ahead(self, plant: Plant) -> ActuatorCommand | None:
+        """Return the command of a frame that was answered ahead; the frame is sent if it holds more than a state."""
+        time_us = plant.world.time_us
+        command = self._end.take_ahead(time_us)
+        if command is None:
+            return None
+        has_tlog = self._logs is not None and self._logs.has_tlog
+        if has_tlog or self._streams_truth or plant.has_news or self._end.sends_battery(time_us):
+            self._offer(plant)
+        else:
+            self._end.skip()
+            self._passed.append(plant.world)
+        return command
 
     def _offer(self, plant: Plant) -> float:
         world = plant.world
@@ -115,6 +131,7 @@ class Server:
         self._log_traffic([])  # while the autopilot computes
         self._time_us = world.time_us
         self._log_traffic(sent)
+        self._log_passed()
         self._log(world)
         self._progress.report(world.time_us / 1e6, now_s - self._began_s)
         plant.foresee()
@@ -138,6 +155,11 @@ class Server:
         if world is not self._logged:
             self._keep(PlantLogs.write_world, world)
         self._logged = world
+
+    def _log_passed(self) -> None:
+        passed, self._passed = self._passed, []
+        for world in passed:
+            self._log(world)
 
     def _keep(self, write: Callable[[PlantLogs, *Ts], None], *args: *Ts) -> None:
         """Write to the logs; an endless flight goes on without a log that cannot be written."""

@@ -139,9 +139,9 @@ class LockstepSession:
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
-        alone = read_actuators(answer, self._autopilot_source, self._rotors)
-        if alone is not None:
-            return alone
+        commands = read_actuators(answer, self._autopilot_source, self._rotors)
+        if commands:
+            return commands[0]
         for message in self._codec.decode(answer):
             command = decode_actuators(message, self._rotors) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:

@@ -287,6 +287,15 @@ def test_heartbeats_count_in_simulated_time(plant: PlantEnd, autopilot: Autopilo
 @pytest.mark.parametrize("feedback", Feedback)
 @pytest.mark.parametrize("seed", range(10))
 def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Feedback) -> None:
+    flown_over_a_bad_link(seed, feedback, ahead=0)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_answers_ahead_change_nothing_over_a_bad_link(seed: int) -> None:
+    flown_over_a_bad_link(seed, Feedback.STATE, ahead=2)
+
+
+def flown_over_a_bad_link(seed: int, feedback: Feedback, *, ahead: int) -> None:
     chance = random.Random(seed)
     tell = frame_at if feedback is Feedback.STATE else sensors_at
     plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))
@@ -311,18 +320,42 @@ def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Fee
             to, datagram = in_flight.pop()
             if to == "plant":
                 command = plant.receive(datagram, ADDRESS, now_s)
-                if command:
+                while command:
                     obeyed.append(command.time_us)
-                    plant.offer(tell(command.time_us + INTERVAL_US), now_s)
+                    command = plant.take_ahead(command.time_us + INTERVAL_US)
+                    if command is None:
+                        plant.offer(tell(obeyed[-1] + INTERVAL_US), now_s)
             else:
                 received = autopilot.receive(datagram, now_s)
                 if received:
                     computed.append(received.frame)
-                    autopilot.answer(command_at(received.frame.time_us))
+                    coming = [received.frame.time_us + k * INTERVAL_US for k in range(1, ahead + 1)]
+                    autopilot.answer(command_at(received.frame.time_us), (), list(map(command_at, coming)))
         for datagram in autopilot.take_outbox():
             post("plant", datagram)
-    assert obeyed == [sample * INTERVAL_US for sample in range(50)]
-    assert computed[:50] == [tell(time_us) for time_us in obeyed]
+    assert obeyed == [sample * INTERVAL_US for sample in range(len(obeyed))]
+    assert computed[:17] == [tell(time_us) for time_us in obeyed[:: ahead + 1]][:17]
+
+
+def test_a_plant_that_sends_a_frame_answered_ahead_is_answered_again(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    assert not autopilot.may_answer_ahead(2 * INTERVAL_US)  # after a frame with a heartbeat
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.0)
+    assert autopilot.may_answer_ahead(2 * INTERVAL_US)
+    assert not autopilot.may_answer_ahead(5 * INTERVAL_US)  # its frame tells of the battery
+    autopilot.answer(command_at(INTERVAL_US), (), [command_at(2 * INTERVAL_US)])
+    (both,) = autopilot.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.0) is None
+    assert autopilot.take_outbox() == [both]
+    assert plant.receive(both, ADDRESS, 0.0) == command_at(INTERVAL_US)
+    assert plant.take_ahead(3 * INTERVAL_US) is None
+    assert plant.take_ahead(2 * INTERVAL_US) == command_at(2 * INTERVAL_US)
+    assert autopilot.receive(offered(plant, frame_at(2 * INTERVAL_US)), 0.0) is None
+    assert autopilot.take_outbox() == [both]
+    assert plant.receive(both, ADDRESS, 0.0) == command_at(2 * INTERVAL_US)
 
 
 BATTERY = PlantBattery(15.5, 12.25, 0.5, 0.75)
