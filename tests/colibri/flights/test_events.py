@@ -98,13 +98,15 @@ FLOWN: dict[str, tuple[Any, str, float, float]] = {
     "function": ({"t": 0.1, "event": "wind", "wind": lambda t: (20.0 * t, 0.0, 0.0)}, "x", 1e-5, 1.0),
     "motor": ("0.1:motor=1,0.6", "theta", 1e-3, 1.0),
     "failure": ("0.1:failure=motor,wrong,1,0.6", "theta", 1e-3, 1.0),
-    "motor of eight": ("0.1:motor=8,0.6", "theta", 1e-3, 1.0),
+    "motor of eight": ("0.1:motor=8,0.6", "z", 1e-3, 1.0),
 }
 
 
 @pytest.mark.parametrize(("event", "column", "low", "high"), FLOWN.values(), ids=list(FLOWN))
 def test_an_event_acts_from_its_time_on(event: Any, column: str, low: float, high: float) -> None:
-    options: dict[str, Any] = {"duration": 0.4, "vehicle": "s1000" if "=8" in event else "hummingbird"}
+    options: dict[str, Any] = {"duration": 0.4, "vehicle": "hummingbird"}
+    if "=8" in event:  # by the law with less machine code for other numbers of rotors
+        options |= {"vehicle": "s1000", "controller": "geometric-se3"}
     calm = colibri.fly("hover", **options)
     flights = [colibri.fly("hover", events=[event], link=link, **options) for link in ("memory", "memory", "direct")]
     (flight, again, direct) = flights
