@@ -14,6 +14,7 @@ _SLOW, _PART = 0.1, 0.025  # filter gains of means, over 0.25 s, and of variance
 _LARGE = 36.0  # least variance of the error, in those of an axis
 _TURNS, _FITS = 0.25, 0.35  # in parts of it: least variance of the field, and largest of the error at the right lag
 _WORSE = 1.25  # than at the right lag the field must fit at the longest: a wrong attitude may improve with the lag
+_FITTING = 4  # samples in a row: 0.1 s, in which a sudden bias moves the best lag to the longest
 _TURNS_AGAIN, _FITS_AGAIN = 2.0, 0.5  # of a field on time again: least variance, in parts of _LARGE, largest error
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
@@ -28,7 +29,7 @@ class FieldLag:
     def __init__(self, variance: float) -> None:
         self._large = _LARGE * variance
         self._next_us = 0
-        self.late = False
+        self.late, self._fitting = False, 0
         self._predicted: deque[Vector] = deque(maxlen=_LAGS[-1])
         self._measured, self._now, self._before = _Spread(), _Spread(), [_Spread() for _ in _LAGS]
 
@@ -48,8 +49,10 @@ class FieldLag:
         least = min(at_lags)
         if self.late:
             self.late = error > self._large or turns < _TURNS_AGAIN * self._large or error > _FITS_AGAIN * least
-        elif error > self._large and turns > _TURNS * error:
-            self.late = least < _FITS * error and at_lags[-1] > _WORSE * least
+        else:
+            fits = least < _FITS * error and at_lags[-1] > _WORSE * least
+            self._fitting = self._fitting + 1 if fits and error > self._large and turns > _TURNS * error else 0
+            self.late = self._fitting >= _FITTING
 
 
 class _Spread:
