@@ -43,31 +43,6 @@ def answer(
     return answered
 
 
-def answer_ahead(
-    end: AutopilotEnd,
-    step: Callable[[Frame, PlantStatus], Step],
-    repeat: Callable[[int], Step | None],
-    interval_us: int,
-    datagram: bytes,
-    now_s: float,
-) -> list[Step]:
-    """Answer as `answer`, with the frames up to the next control sample that need no more than their time."""
-    received = end.receive(datagram, now_s)
-    if received is None:
-        return []
-    steps = [step(*received)]
-    first = steps[0]
-    time_us = first.command.time_us + interval_us
-    while first.decision is not None and end.may_answer_ahead(time_us):
-        again = repeat(time_us)
-        if again is None:
-            break
-        steps.append(again)
-        time_us += interval_us
-    end.answer(first.command, first.faults, [again.command for again in steps[1:]])
-    return steps
-
-
 class Received(NamedTuple):
     """A datagram of a ground station, and whether it may set up signing (`owner`)."""
 

@@ -5,7 +5,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVarTuple
 
 from colibri.autopilot.core.autopilot import Autopilot
-from colibri.autopilot.core.step import Step, answer, answer_ahead
+from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
@@ -85,11 +85,23 @@ class PlantClient:
 
     def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> list[Step]:
         """Answer a datagram: its frame, and without ground stations also those that need no more than their time."""
-        now_s, end = perf_counter(), self._end
-        if self._ground is None and isinstance(end, AutopilotEnd):
-            return answer_ahead(end, autopilot.step, autopilot.repeat, autopilot.frame_interval_us, datagram, now_s)
-        step = answer(end, autopilot.step, datagram, now_s)
-        return [] if step is None else [step]
+        now_s, end, interval_us = perf_counter(), self._end, autopilot.frame_interval_us
+        if self._ground is not None or not isinstance(end, AutopilotEnd):
+            step = answer(end, autopilot.step, datagram, now_s)
+            return [] if step is None else [step]
+        received = end.receive(datagram, now_s)
+        if received is None:
+            return []
+        first = autopilot.step(*received)
+        steps, time_us = [first], first.command.time_us + interval_us
+        while first.decision is not None and end.may_answer_ahead(time_us):
+            repeated = autopilot.repeat(time_us)
+            if repeated is None:
+                break
+            steps.append(repeated)
+            time_us += interval_us
+        end.answer(first.command, first.faults, [repeated.command for repeated in steps[1:]])
+        return steps
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
         """Write to the log, whose failure ends only flights without ground stations."""
