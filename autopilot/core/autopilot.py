@@ -123,6 +123,10 @@ class Autopilot(Generic[StagesT]):
         faults, delay_us = stages.faults(), stages.delay.delay_us
         return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
 
+    def is_due(self, time_us: int) -> bool:
+        """Whether the frame of a time is a control sample."""
+        return self.stages.loop.is_due(time_us)
+
     def repeat(self, now_us: int) -> Step | None:
         """Answer a frame between two control samples without its content; None if that matters."""
         stages = self.stages

@@ -84,23 +84,25 @@ class PlantClient:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> list[Step]:
-        """Answer a datagram: its frame, and without ground stations also those that need no more than their time."""
+        """Answer a datagram, and without ground stations the frames up to the next control sample.
+
+        Those that need no more than their time are flown, too.
+        """
         now_s, end, interval_us = perf_counter(), self._end, autopilot.frame_interval_us
         if self._ground is not None or not isinstance(end, AutopilotEnd):
-            step = answer(end, autopilot.step, datagram, now_s)
-            return [] if step is None else [step]
+            answered = answer(end, autopilot.step, datagram, now_s)
+            return [] if answered is None else [answered]
         received = end.receive(datagram, now_s)
         if received is None:
             return []
-        first = autopilot.step(*received)
-        steps, time_us = [first], first.command.time_us + interval_us
-        while first.decision is not None and end.may_answer_ahead(time_us):
+        step = autopilot.step(*received)
+        steps, commands, time_us = [step], [], step.command.time_us + interval_us
+        while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
+            commands.append(step.command._replace(time_us=time_us))
             repeated = autopilot.repeat(time_us)
-            if repeated is None:
-                break
-            steps.append(repeated)
+            steps += [] if repeated is None else [repeated]
             time_us += interval_us
-        end.answer(first.command, first.faults, [repeated.command for repeated in steps[1:]])
+        end.answer(step.command, step.faults, commands)
         return steps
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:

@@ -118,7 +118,11 @@ class InMemory:
         self._uncounted = 0  # frames since the last one that both ends have counted
         self._controls: tuple[PerRotor, PerRotor] = ((), ())  # of the last command, as sent and as received
         self.plant_end = PlantEnd(
-            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
+            system_id=SYSTEM_ID,
+            frame_interval_us=frame_interval_us,
+            serves=[feedback],
+            rotors=rotors,
+            takes_ahead=traffic is None,
         )
         self.autopilot_end = AutopilotEnd(
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback

@@ -6,9 +6,9 @@ The plant sends the frame of time t and advances only with the command that name
 - a repeated frame gets the remembered answer, so each frame is computed once;
 - messages of a time other than the awaited one are dropped.
 
-Between two control samples the command stays, and the state is not needed. An autopilot without ground stations
-therefore answers a control sample with the commands of all frames up to the next one, in one datagram, and the plant
-advances through these frames without sending those that hold only a state.
+Between two control samples the command stays. To a plant that takes answers ahead (`TAKES_AHEAD` in its HEARTBEAT), an
+autopilot without ground stations therefore answers a control sample with the commands of all frames up to the next one,
+in one datagram. The plant advances through these frames without waiting; it does not send those that hold only a state.
 
 The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (ATTITUDE_QUATERNION for state frames, HIL_SENSOR
 for sensor frames) and a HEARTBEAT. The plant begins with the first such call, and resumes with a restarted autopilot.
@@ -17,7 +17,7 @@ With its frame the plant sends its battery twice a second and to each new caller
 effect, if any (NAMED_VALUE_INT cmd_delay, µs). Faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, are accepted only
 appended to the answer of a frame, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 
-A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and accepts any newer answer; the autopilot
+A free-running plant (`FREE_RUNNING`) sends each frame once and accepts any newer answer; the autopilot
 continues from the newest frame. In lockstep a new flight begins at time 0 only.
 """
 
@@ -37,7 +37,7 @@ CALL_AFTER_S = 1.0  # wall-clock silence before the autopilot calls again, and a
 CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 BATTERY_EVERY_US = 500_000
-FREE_RUNNING = 1  # HEARTBEAT.custom_mode of a free-running plant
+FREE_RUNNING, TAKES_AHEAD = 1, 2  # HEARTBEAT.custom_mode of a free-running plant, and of one that takes answers ahead
 FRAME_INTERVALS_US = range(1_000, 1_000_001, 1_000)
 
 ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: dialect.MSG_HIL_SENSOR}

@@ -6,7 +6,7 @@ from colibri.mavlink.hil import lockstep
 from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
 from colibri.mavlink.hil.faults import Fault, encode_fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import CALL_AFTER_S, FREE_RUNNING, AnsweringEnd
+from colibri.mavlink.hil.lockstep import CALL_AFTER_S, FREE_RUNNING, TAKES_AHEAD, AnsweringEnd
 from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_delay, decode_result
 from colibri.mavlink.hil.sensors import Frame, decode_sensors, read_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, decode_state, encode_actuators, read_state
@@ -30,7 +30,7 @@ class AutopilotEnd(AnsweringEnd):
         self._feedback = feedback
         self._made_of = lockstep.MADE_OF[feedback]
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
-        self._runs_freely: bool | None = None
+        self._kind: int | None = None  # of the plant
         self._is_plain = False  # whether the last frame came alone
         self._answered_us: frozenset[int] = frozenset()  # times of the commands in the last answer
 
@@ -62,8 +62,8 @@ class AutopilotEnd(AnsweringEnd):
             elif message.name == "NAMED_VALUE_INT":
                 delay_us = decode_delay(message)
             elif message.name == "HEARTBEAT":
-                if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
-                    self._runs_freely = message.fields.custom_mode == FREE_RUNNING
+                if self._kind is None or self.silence_s(now_s) >= CALL_AFTER_S:
+                    self._kind = message.fields.custom_mode
             else:
                 self.dropped["unexpected"] += 1
         if not parts:
@@ -86,7 +86,9 @@ class AutopilotEnd(AnsweringEnd):
         faults: Sequence[Fault | WorldChange] = (),
         ahead: Sequence[ActuatorCommand] = (),
     ) -> None:
-        """Answer the last frame, and with `ahead` the next ones, which then are not returned."""
+        """Answer the last frame, and with `ahead` the next ones; of these, frames of states are not returned."""
+        if command.time_us in self._answered_us:
+            return
         answer = encode_actuators(self._codec, command)
         for fault in faults:
             encode = encode_fault if isinstance(fault, Fault) else encode_change
@@ -95,16 +97,18 @@ class AutopilotEnd(AnsweringEnd):
             answer += self._heartbeat(command.armed)
         for coming in ahead:
             answer += encode_actuators(self._codec, coming)
-        if ahead:
+        self._answered_us = frozenset(coming.time_us for coming in ahead)
+        if ahead and self._feedback is Feedback.STATE:
             self._time_us = ahead[-1].time_us
-            self._answered_us = frozenset((command.time_us, *(coming.time_us for coming in ahead)))
+            self._answered_us |= {command.time_us}
         self._answer = answer
         self._outbox.append(answer)
 
     def may_answer_ahead(self, time_us: int) -> bool:
-        """Whether the plant waits with the frame of a coming time, which holds nothing but a state."""
-        holds_more = time_us % lockstep.BATTERY_EVERY_US == 0 or time_us % lockstep.HEARTBEAT_EVERY_US == 0
-        return self._is_plain and self._runs_freely is False and not holds_more
+        """Whether the plant takes an answer to the frame of a coming time; one of states must hold nothing else."""
+        if self._kind != TAKES_AHEAD or time_us % lockstep.HEARTBEAT_EVERY_US == 0:
+            return False
+        return self._feedback is Feedback.SENSORS or (self._is_plain and time_us % lockstep.BATTERY_EVERY_US != 0)
 
     def poll(self, now_s: float) -> float:
         if self.silence_s(now_s) < CALL_AFTER_S:
@@ -124,22 +128,24 @@ class AutopilotEnd(AnsweringEnd):
         return decode_state(first, *came) if came else None
 
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
-        if frame.time_us == self._time_us or frame.time_us in self._answered_us:
+        knows_all = self._feedback is Feedback.STATE and frame.time_us in self._answered_us
+        if frame.time_us == self._time_us or knows_all:
             self._received_s = now_s
             self._answer_again()
             return None
         if self._time_us is not None and not self._follows(frame.time_us, self._time_us):
             lost = self.silence_s(now_s) >= CALL_AFTER_S
-            if not lost or not (self._runs_freely or frame.time_us == 0):
+            if not lost or not (self._kind == FREE_RUNNING or frame.time_us == 0):
                 self.dropped["out of step"] += 1
                 return None
         self._received_s = now_s
         self._time_us = frame.time_us
-        self._answer, self._answered_us = None, frozenset()
+        if frame.time_us not in self._answered_us:
+            self._answer, self._answered_us = None, frozenset()
         return frame
 
     def _follows(self, time_us: int, before_us: int) -> bool:
-        return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
+        return time_us > before_us if self._kind == FREE_RUNNING else time_us == before_us + self._frame_interval_us
 
     def _call(self) -> bytes:
         asked = (lockstep.ASKED_BY[self._feedback], self._frame_interval_us, *(0.0,) * 5)

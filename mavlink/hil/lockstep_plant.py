@@ -1,7 +1,7 @@
 """The plant's end of the lockstep protocol."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import NamedTuple
 
 from colibri.common.types import Address
@@ -38,11 +38,13 @@ class PlantEnd:
         frame_interval_us: int,
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
+        takes_ahead: bool = False,
         rotors: int = ROTORS,
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
         """Begin without autopilot; `is_there` tells whether a silent one still has its address."""
         self.waits = waits  # or runs freely
+        self._kind = (lockstep.TAKES_AHEAD if takes_ahead else 0) if waits else lockstep.FREE_RUNNING
         self._rotors = rotors
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
@@ -59,6 +61,7 @@ class PlantEnd:
         self.received: list[bytes] = []  # valid frames; the owner may log and clear it
         self._peer_received_s = 0.0
         self._frames: tuple[bytes, ...] = ()
+        self._unanswered: list[tuple[bytes, ...]] = []  # frames sent since the last answer
         self._begun = False
         self._awaited_us: int | None = None
         self._answered_us: int | None = None
@@ -96,13 +99,18 @@ class PlantEnd:
         self._frames = tuple(frames)
         self._begun = True
         self._awaited_us = frame.time_us
-        self._send_frame(now_s)
+        if not self.waits:
+            self._unanswered.clear()
+        self._unanswered.append(self._frames)
+        self._send([self._frames], now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         commands = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else []
         if not commands:
             return self._receive_any(datagram, sender, now_s)
-        self._note(datagram, now_s)
+        size = len(datagram) // len(commands)
+        for at in range(0, len(datagram), size):
+            self._note(datagram[at : at + size], now_s)
         return self._accept_first(commands)
 
     def take_ahead(self, time_us: int) -> ActuatorCommand | None:
@@ -151,17 +159,17 @@ class PlantEnd:
             return now_s + lockstep.RESEND_AFTER_S
         if now_s >= self._resend_at_s:
             self.resent += 1
-            self._send_frame(now_s)
+            self._send(self._unanswered, now_s)
         return self._resend_at_s
 
     def take_outbox(self) -> list[PlantDatagram]:
         outbox, self._outbox = self._outbox, []
         return outbox
 
-    def _send_frame(self, now_s: float) -> None:
+    def _send(self, frames: Iterable[tuple[bytes, ...]], now_s: float) -> None:
         self._resend_at_s = now_s + lockstep.RESEND_AFTER_S
         if self.peer is not None:
-            self._outbox.append(PlantDatagram(self._frames, self.peer))
+            self._outbox += [PlantDatagram(each, self.peer) for each in frames]
 
     def _receive_heartbeat(self, sender: Address, now_s: float) -> None:
         if sender == self.peer or self._is_another(sender, now_s):
@@ -172,7 +180,8 @@ class PlantEnd:
                 self._frames += (plant_status.encode_battery(self._codec, self._battery),)
             if not self.waits:
                 self._frames += (self._heartbeat(),)
-            self._send_frame(now_s)
+            self._unanswered[-1:] = [self._frames]
+            self._send([self._frames], now_s)
 
     def _is_another(self, sender: Address, now_s: float) -> bool:
         if not lockstep.is_another(sender, self.peer, now_s - self._peer_received_s, self._is_there):
@@ -184,7 +193,7 @@ class PlantEnd:
         return True
 
     def _heartbeat(self) -> bytes:
-        return lockstep.plant_heartbeat(self._codec, 0 if self.waits else lockstep.FREE_RUNNING)
+        return lockstep.plant_heartbeat(self._codec, self._kind)
 
     def _receive_fault(self, message: Message, *, answered: bool) -> None:
         fields = message.fields
@@ -243,6 +252,7 @@ class PlantEnd:
         elif self.waits:
             self._awaited_us = None
             self._ahead.clear()
+            self._unanswered.clear()
         else:
             self._answered_us = command.time_us
         return command

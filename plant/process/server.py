@@ -10,6 +10,7 @@ from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PaceChange, WorldChange
@@ -114,8 +115,7 @@ class Server:
         command = self._end.take_ahead(time_us)
         if command is None:
             return None
-        has_tlog = self._logs is not None and self._logs.has_tlog
-        if has_tlog or self._streams_truth or plant.has_news or self._end.sends_battery(time_us):
+        if self._end.feedback is Feedback.SENSORS or plant.has_news or self._end.sends_battery(time_us):
             self._offer(plant)
         else:
             self._end.skip()
@@ -280,6 +280,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
         frame_interval_us=interval_us,
         serves=tuple(builder.starts),
         waits=not spec.realtime,
+        takes_ahead=not (spec.tlog or spec.truth),
         rotors=builder.vehicle.rotors.count,
         is_there=is_bound,
     )

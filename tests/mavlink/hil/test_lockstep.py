@@ -59,7 +59,7 @@ def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
 
 @pytest.fixture
 def plant() -> PlantEnd:
-    return PlantEnd(system_id=1, frame_interval_us=4_000)
+    return PlantEnd(system_id=1, frame_interval_us=4_000, takes_ahead=True)
 
 
 @pytest.fixture
@@ -290,9 +290,10 @@ def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Fee
     flown_over_a_bad_link(seed, feedback, ahead=0)
 
 
+@pytest.mark.parametrize("feedback", Feedback)
 @pytest.mark.parametrize("seed", range(10))
-def test_answers_ahead_change_nothing_over_a_bad_link(seed: int) -> None:
-    flown_over_a_bad_link(seed, Feedback.STATE, ahead=2)
+def test_answers_ahead_change_nothing_over_a_bad_link(seed: int, feedback: Feedback) -> None:
+    flown_over_a_bad_link(seed, feedback, ahead=2)
 
 
 def flown_over_a_bad_link(seed: int, feedback: Feedback, *, ahead: int) -> None:
@@ -323,18 +324,20 @@ def flown_over_a_bad_link(seed: int, feedback: Feedback, *, ahead: int) -> None:
                 while command:
                     obeyed.append(command.time_us)
                     command = plant.take_ahead(command.time_us + INTERVAL_US)
-                    if command is None:
+                    if command is None or feedback is Feedback.SENSORS:
                         plant.offer(tell(obeyed[-1] + INTERVAL_US), now_s)
             else:
                 received = autopilot.receive(datagram, now_s)
                 if received:
                     computed.append(received.frame)
-                    coming = [received.frame.time_us + k * INTERVAL_US for k in range(1, ahead + 1)]
+                    due = received.frame.time_us % ((ahead + 1) * INTERVAL_US) == 0
+                    coming = [received.frame.time_us + k * INTERVAL_US for k in range(1, ahead + 1) if due]
                     autopilot.answer(command_at(received.frame.time_us), (), list(map(command_at, coming)))
         for datagram in autopilot.take_outbox():
             post("plant", datagram)
     assert obeyed == [sample * INTERVAL_US for sample in range(len(obeyed))]
-    assert computed[:17] == [tell(time_us) for time_us in obeyed[:: ahead + 1]][:17]
+    every = 1 if feedback is Feedback.SENSORS else ahead + 1
+    assert computed[:16] == [tell(time_us) for time_us in obeyed[::every]][:16]
 
 
 def test_a_plant_that_sends_a_frame_answered_ahead_is_answered_again(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
@@ -351,6 +354,7 @@ def test_a_plant_that_sends_a_frame_answered_ahead_is_answered_again(plant: Plan
     assert autopilot.receive(outgoing.datagram, 0.0) is None
     assert autopilot.take_outbox() == [both]
     assert plant.receive(both, ADDRESS, 0.0) == command_at(INTERVAL_US)
+    assert b"".join(plant.received[-2:]) == both
     assert plant.take_ahead(3 * INTERVAL_US) is None
     assert plant.take_ahead(2 * INTERVAL_US) == command_at(2 * INTERVAL_US)
     assert autopilot.receive(offered(plant, frame_at(2 * INTERVAL_US)), 0.0) is None
