@@ -122,7 +122,7 @@ class InMemory:
             frame_interval_us=frame_interval_us,
             serves=[feedback],
             rotors=rotors,
-            takes_ahead=traffic is None,
+            takes_ahead=True,
         )
         self.autopilot_end = AutopilotEnd(
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
