@@ -265,6 +265,9 @@ class Filter:
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
 
+    def field_is_late(self, now_us: int) -> bool:
+        return self.magnetometer.is_late(self.x, self.P, now_us)
+
     def jump_gyro_bias(self, bias: Vector, misturned_s: float, time_us: int) -> None:
         """Add to the gyroscope bias, rad/s, by which the attitude has been turned for `misturned_s`."""
         self.x[10:13] += bias

@@ -99,6 +99,13 @@ class MagnetometerFusion(FusedInstrument):
             self._doubt(P, part)
         return None if accepted else Reason.INNOVATION
 
+    def is_late(self, x: Array, P: Array, now_us: int) -> bool:
+        """Whether the field is wrong, not the gyroscope, if GPS velocity contradicts the attitude as well."""
+        if self._lag.late or not self._lag.convict(now_us):
+            return False
+        self._doubt_gyroscope(x, P)
+        return True
+
     def _compare(self, value: Value, innovation: Sequence[float], time_us: int) -> None:
         (x, y, z), (a, b, c) = value, innovation
         self._lag.add((x, y, z), (x - a, y - b, z - c), time_us)

@@ -15,6 +15,10 @@ _LARGE = 36.0  # least variance of the error, in those of an axis
 _TURNS, _FITS = 0.25, 0.35  # in parts of it: least variance of the field, and largest of the error at the right lag
 _WORSE = 1.25  # than at the right lag the field must fit at the longest: a wrong attitude may improve with the lag
 _FITTING = 4  # samples in a row: 0.1 s, in which a sudden bias moves the best lag to the longest
+_SUSPECT, _SUSPECTED_US = (
+    0.5,
+    600_000,
+)  # the same as _FITS, for so long, if GPS velocity contradicts the attitude as well
 _TURNS_AGAIN, _FITS_AGAIN = 2.0, 0.5  # of a field on time again: least variance, in parts of _LARGE, largest error
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
@@ -29,7 +33,7 @@ class FieldLag:
     def __init__(self, variance: float) -> None:
         self._large = _LARGE * variance
         self._next_us = 0
-        self.late, self._fitting = False, 0
+        self.late, self._fitting, self._suspected_us = False, 0, -_SUSPECTED_US
         self._predicted: deque[Vector] = deque(maxlen=_LAGS[-1])
         self._measured, self._now, self._before = _Spread(), _Spread(), [_Spread() for _ in _LAGS]
 
@@ -49,10 +53,17 @@ class FieldLag:
         least = min(at_lags)
         if self.late:
             self.late = error > self._large or turns < _TURNS_AGAIN * self._large or error > _FITS_AGAIN * least
-        else:
-            fits = least < _FITS * error and at_lags[-1] > _WORSE * least
-            self._fitting = self._fitting + 1 if fits and error > self._large and turns > _TURNS * error else 0
-            self.late = self._fitting >= _FITTING
+            return
+        differs = error > self._large and turns > _TURNS * error and at_lags[-1] > _WORSE * least
+        if differs and least < _SUSPECT * error:
+            self._suspected_us = time_us
+        self._fitting = self._fitting + 1 if differs and least < _FITS * error else 0
+        self.late = self._fitting >= _FITTING
+
+    def convict(self, now_us: int) -> bool:
+        """Decide whether the field or the gyroscope is wrong; return whether the field comes late."""
+        self.late |= now_us - self._suspected_us < _SUSPECTED_US
+        return self.late
 
 
 class _Spread:

@@ -50,6 +50,17 @@ def test_a_field_that_is_on_time_again_is_not_late() -> None:
     assert not seen[-1]
 
 
+@pytest.mark.parametrize(("late_s", "convicted"), [(0.2, True), (0.0, False)])
+def test_a_suspect_field_is_convicted_instead_of_the_gyroscope(late_s: float, convicted: bool) -> None:
+    lag = FieldLag(NOISE_GAUSS**2)
+    for sample in range(360):
+        t = sample * INTERVAL_US * 1e-6
+        lag.add(field(swings(t - late_s)), field(swings(t)), sample * INTERVAL_US)
+        if lag.late:
+            break
+    assert lag.convict((sample + 100) * INTERVAL_US) is convicted
+
+
 def verdicts(flies: Callable[[float], float], late_s: Callable[[float], float], lead_rad: float = 0.0) -> list[bool]:
     lag, noise, seen = FieldLag(NOISE_GAUSS**2), np.random.default_rng(1), []
     for sample in range(2000):
