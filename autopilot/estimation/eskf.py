@@ -254,7 +254,12 @@ class Filter:
         update.inflate_covariance(self.P, first, 3, square(max(sigma, _MIN_NOISE)))
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
-        """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` in `since_s`."""
+        """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` in `since_s`.
+
+        If the field is rather late, return to an older bias instead.
+        """
+        if self.magnetometer.convict(self.x, self.P, time_us):
+            return
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
@@ -264,9 +269,6 @@ class Filter:
         self.velocity.reset(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
-
-    def field_is_late(self, now_us: int) -> bool:
-        return self.magnetometer.is_late(self.x, self.P, now_us)
 
     def jump_gyro_bias(self, bias: Vector, misturned_s: float, time_us: int) -> None:
         """Add to the gyroscope bias, rad/s, by which the attitude has been turned for `misturned_s`."""

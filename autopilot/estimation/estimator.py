@@ -281,7 +281,7 @@ class Estimator:
             self.filter.reset_accel_bias(found, now_us)
             self._inertial_watch.look_at_bias(float(np.abs(self.filter.x[13:16]).max()))
         turned = turned_since(self.filter, now_us)
-        if turned is not None and not modelled.rate_modelled and not self.filter.field_is_late(now_us):
+        if turned is not None and not modelled.rate_modelled:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:

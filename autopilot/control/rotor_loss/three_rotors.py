@@ -31,7 +31,7 @@ _FARTHER_DEG_M, _FAR_M, _WIND_TILT_DEG = 2.0, 1.5, 16.0  # extra tilt per metre 
 _WIND_RAD_S, _MAX_WIND_M_S2 = 1.5, 2.0  # bandwidth and limit of the disturbance observer
 _SETTLE_S, _SINK_M_S, _LAND_M_S, _LAND_ABOVE_M = 1.5, 1.0, 0.6, 2.0  # hover time, sink rates high and low
 _KNOCK, _JUMP = 0.35, 0.25  # touch-down: upward impulse near the ground, parts of _LAND_M_S, and its largest sample
-_KNOCK_FADES = 0.25  # parts of gravity: a correction of the estimate, in one sample, is no knock
+_KNOCK_FADES = 0.25  # of the impulse, in parts of gravity: a correction of the estimate comes in one sample
 _STAYS_M_S, _STAYS_S = 0.2, 1.5  # touch-down: slower than this for so long in spite of the commanded sink rate
 
 

@@ -99,8 +99,8 @@ class MagnetometerFusion(FusedInstrument):
             self._doubt(P, part)
         return None if accepted else Reason.INNOVATION
 
-    def is_late(self, x: Array, P: Array, now_us: int) -> bool:
-        """Whether the field is wrong, not the gyroscope, if GPS velocity contradicts the attitude as well."""
+    def convict(self, x: Array, P: Array, now_us: int) -> bool:
+        """Reject a suspect field if GPS velocity contradicts the attitude as well; return whether it begins now."""
         if self._lag.late or not self._lag.convict(now_us):
             return False
         self._doubt_gyroscope(x, P)
