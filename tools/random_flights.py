@@ -264,7 +264,7 @@ class _JudgedFlight:
             self._impact = f"impact at {speed_m_s:.1f} m/s, {tilt_deg:.0f} degrees, t = {flight.time_s:.2f} s"
             self._contact = (flight.time_s, velocity) if tilt_deg <= MAX_TILT_DEG else None
         elif self._contact and flight.time_s > self._contact[0] + GRAZE_S:
-            if z > NEAR_GROUND_M and dist(flight.velocity, self._contact[1]) < GRAZE_M_S:
+            if z > TOUCHING_M and dist(flight.velocity, self._contact[1]) < GRAZE_M_S:
                 self._impact = ""
             self._contact = None
         if armed and not flight.armed and z > AIRBORNE_M:

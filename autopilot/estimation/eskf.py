@@ -208,7 +208,9 @@ class Filter:
             accepted &= self.velocity.force_accept(x, P, time_us, update.fuse_velocity, z[3:], variances[0])
         if not self.position.note(time_us, (e, n), lies):
             accepted &= self.position.force_accept(x, P, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
-        if not self.height.note(time_us, (u,), stands):
+        if self.height.note(time_us, (u,), stands):
+            self.barometer.height_known_us = time_us
+        else:
             accepted &= self.height.force_accept(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
         return None if accepted else Reason.INNOVATION
 

@@ -23,6 +23,7 @@ _HELD_M, _HELD_US = 0.3, 5_000_000
 _CLEAR_M = 0.3
 HARD_M_S, HARD_UP = 3.0, 0.5  # speed, and cosine of the tilt, beyond which a contact is an impact
 HARD_WITHIN_US = 4_000_000  # a landing is detected at most so long after its contact
+_SUNK_M = 0.5
 KNOCK_SAMPLES = 6
 _KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0  # velocity change within so many samples, and acceleration, of a contact alone
 _SCRAPES_M, _SCRAPES_US = 0.1, 500_000  # height and duration of a motion along the ground that is an impact
@@ -131,6 +132,7 @@ class Hardest(NamedTuple):
     time_us: int = -HARD_WITHIN_US
     speed_m_s: float = 0.0
     up: float = 1.0
+    height_m: float = 0.0
 
     def after(self, now_us: int, state: VehicleState) -> "Hardest":
         vx, vy, vz = state.velocity_enu_m_s
@@ -139,7 +141,11 @@ class Hardest(NamedTuple):
         if squared <= HARD_M_S * HARD_M_S and up >= HARD_UP:
             return self
         old = Hardest() if now_us - self.time_us > HARD_WITHIN_US else self
-        return Hardest(now_us, max(sqrt(squared), old.speed_m_s), min(up, old.up))
+        return Hardest(now_us, max(sqrt(squared), old.speed_m_s), min(up, old.up), state.position_enu_m[2])
+
+    def is_past(self, state: VehicleState) -> bool:
+        """Whether the vehicle has sunk well below that motion, and still sinks: it did not end at the ground."""
+        return state.position_enu_m[2] < self.height_m - _SUNK_M and state.velocity_enu_m_s[2] < -_STILL_M_S
 
     def is_recent(self, now_us: int) -> bool:
         return now_us - self.time_us <= HARD_WITHIN_US

@@ -117,7 +117,9 @@ class GroundContact:
             motions.clear()
         motions.append(motion)
         if self._lack.lack_s < SUSPECTED_S:
-            self._hardest = self._hardest.after(now_us, vehicle)
+            hardest = self._hardest.after(now_us, vehicle)
+            past = hardest is self._hardest and not drifts and hardest.is_past(vehicle)
+            self._hardest = Hardest() if past else hardest
         fell = not sinks and self._hardest.is_recent(now_us) and is_held_down(wanted_m, vehicle, self.height_m)
         self._landing, stands = watch(
             self._landing, now_us, vehicle, sinks or fell, drifts=drifts, slides=is_far_below(wanted_m, vehicle)

@@ -1,7 +1,7 @@
 """The barometer: height with a drifting offset."""
 
 from colibri.autopilot.estimation import eskf_update as update
-from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
+from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET, POSITION, VELOCITY
 from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, MeasurementKind, Ratio, Value
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
@@ -17,11 +17,19 @@ _FROZEN_US = 500_000
 _MIN_NOISE_M = 1e-6
 _PATIENCE_US = 7_000_000
 _INFLATED_M = 100.0
+_DRIFTS_US = 10_000_000  # rejected again so soon after an acceptance by force, the pressure drifts
+_DRIFTED_US = 60_000_000  # then it is rejected for so long,
+_ALONE_US = 1_000_000  # and while the height of GPS has not been accepted for so long
+_MISLED_M, _MISLED_M_S = 3.0, 1.0
 _TYPICAL_PA = 95e3
 
 
 class BarometerFusion(FusedInstrument):
-    """The barometer of one flight; `height_m` is of the last pressure."""
+    """The barometer of one flight; `height_m` is of the last pressure.
+
+    A pressure that drifts steadily is followed by a filter that has nothing else: without GPS, the vehicle would climb
+    for ever. So a barometer that has been seen to drift is not used alone.
+    """
 
     part, name, numbers = "barometer", "pressure", 1
     source, bit, ratio = RejectedSource.BAROMETER, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Ratio.HEIGHT
@@ -32,6 +40,8 @@ class BarometerFusion(FusedInstrument):
         self.kind = MeasurementKind(self.name, self.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
         self._watch = Watch(self.source, _MIN_PA, _MAX_PA, _FROZEN_US)
         self.height_m = 0.0
+        self._forced_us = self.height_known_us = -_DRIFTED_US  # acceptance by force, accepted height of GPS
+        self._drifts = False
 
     @property
     def variance(self) -> float:
@@ -49,8 +59,27 @@ class BarometerFusion(FusedInstrument):
         (pressure_pa,) = value
         height = self.height_m = altitude_m(pressure_pa)
         variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _MIN_NOISE_M))
+        if self._drifts and self.kind.rejected_us is not None and not self._is_tried_again(time_us):
+            return Reason.INNOVATION
+        resets, was_accepted = self.kind.resets, self.kind.rejected_us is None
         accepted = self.kind.fuse(x, P, time_us, update.fuse_pressure_height, height, variance)
+        if self.kind.resets != resets:
+            self._forced_us = time_us
+        elif was_accepted and time_us > self._forced_us + _DRIFTS_US:
+            self._drifts = False
+        elif was_accepted and not accepted:
+            self._drifts = True
+            self._doubt(P)
         return None if accepted else Reason.INNOVATION
+
+    def _doubt(self, P: Array) -> None:
+        """Let the height be unknown, if GPS does not find it: a drift has moved it and its rate."""
+        update.inflate_covariance(P, POSITION + 2, 1, square(_MISLED_M))
+        update.inflate_covariance(P, VELOCITY + 2, 1, square(_MISLED_M_S))
+
+    def _is_tried_again(self, now_us: int) -> bool:
+        rejected_us = self.kind.rejected_us or 0
+        return now_us - rejected_us > _DRIFTED_US and now_us - self.height_known_us < _ALONE_US
 
     def typical(self) -> Value:
         return (_TYPICAL_PA,)

@@ -10,15 +10,12 @@ from colibri.common.types import Vector
 
 _EVERY_US = 25_000
 _LAGS = (2, 4, 6, 8, 12, 16, 20, 24)  # in samples: 0.05 to 0.6 s
-_SLOW, _PART = 0.1, 0.025  # filter gains of means, over 0.25 s, and of variances about them, over 1 s
+_SLOW, _WINDOW = 0.1, 40  # filter gain of means, over 0.25 s; variances about them are of so many samples: 1 s
 _LARGE = 36.0  # least variance of the error, in those of an axis
 _TURNS, _FITS = 0.25, 0.35  # in parts of it: least variance of the field, and largest of the error at the right lag
 _WORSE = 1.25  # than at the right lag the field must fit at the longest: a wrong attitude may improve with the lag
 _FITTING = 4  # samples in a row: 0.1 s, in which a sudden bias moves the best lag to the longest
-_SUSPECT, _SUSPECTED_US = (
-    0.5,
-    600_000,
-)  # the same as _FITS, for so long, if GPS velocity contradicts the attitude as well
+_SUSPECT, _SUSPECTED_US = 0.5, 600_000  # as _FITS, within such a time, if GPS velocity contradicts the attitude, too
 _TURNS_AGAIN, _FITS_AGAIN = 2.0, 0.5  # of a field on time again: least variance, in parts of _LARGE, largest error
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
@@ -67,10 +64,14 @@ class FieldLag:
 
 
 class _Spread:
-    """Slow mean of the differences of two vectors, and their variance about it."""
+    """Slow mean of the differences of two vectors, and the variance of the last ones about it.
+
+    Turns are forgotten at once after the window: before a fault they make each lag look bad.
+    """
 
     def __init__(self) -> None:
         self._mean: Vector | None = None
+        self._parts = deque([0.0] * _WINDOW, maxlen=_WINDOW)
         self.variance = 0.0
 
     def add(self, one: Vector, other: Vector) -> None:
@@ -79,4 +80,6 @@ class _Spread:
         mx, my, mz = self._mean or (x, y, z)
         dx, dy, dz = x - mx, y - my, z - mz
         self._mean = (mx + _SLOW * dx, my + _SLOW * dy, mz + _SLOW * dz)
-        self.variance += _PART * (dx * dx + dy * dy + dz * dz - self.variance)
+        part = (dx * dx + dy * dy + dz * dz) / _WINDOW
+        self.variance += part - self._parts[0]
+        self._parts.append(part)

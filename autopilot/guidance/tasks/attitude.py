@@ -18,6 +18,7 @@ _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
 _MAX_LIFT_M_S2, _MAX_OFFSET_M_S2 = 6.0, 4.0
 _MIN_UPRIGHT = 0.5
 _RESTS_M_S = 0.025
+_WRONG_BELOW_M, _TWICE_M, _FASTEST_M_S = 3.0, 10.0, 2.0  # an estimate below the ground doubles the descent each 10 m
 
 
 class TiltLoop:
@@ -91,7 +92,11 @@ class AltitudeTask(EndlessTask):
 
 
 class DescentTask(EndlessTask):
-    """Level descent without position or heading."""
+    """Level descent without position or heading.
+
+    An estimate below the ground is wrong: the vehicle sinks more slowly than estimated, or not at all. It then descends
+    faster.
+    """
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
@@ -99,7 +104,9 @@ class DescentTask(EndlessTask):
         self._loop = HeightLoop(self._weight_n, gravity_m_s2)
 
     def update(self, context: TaskContext) -> AttitudeMotion:
-        reference, _ = vertically(context, -sinking_m_s(context), None)
+        under_m = max(context.ground_m - _WRONG_BELOW_M - context.place[2], 0.0)
+        speed_m_s = min(sinking_m_s(context) * (1.0 + under_m / _TWICE_M), max(_FASTEST_M_S, sinking_m_s(context)))
+        reference, _ = vertically(context, -speed_m_s, None)
         thrust_n = self._loop.thrust_n(reference, context)
         motion = self._tilt.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
         sinks = thrust_n < CARRIED * self._weight_n

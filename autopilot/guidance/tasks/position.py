@@ -27,6 +27,7 @@ _REST_M_S, _REST_RAD_S = 0.05, 0.05
 _FACING_RAD, _LEAD_RAD = radians(5.0), 0.5 * pi
 _BELOW_FENCE = 0.9  # part of the height fence that a return climbs to
 _LEAST_CLIMB_M = 2.5  # of a return within a cone (RTL_ABS_MIN_CLIMB)
+_SKIMS_M_S, _CLEAR_M = 2.0, 1.0  # a vehicle that is faster, and lower above home, brakes with its feet off the ground
 _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0  # descent speed per height, down to the landing speed at this height
 
 
@@ -89,7 +90,12 @@ class HoldTask:
             self._place, self._yaw_rad = context.place, context.yaw_rad
             self._target = still_target(self._place, self._yaw_rad, context.samples)
             return PositionMotion(self._target, limits)
-        braking = still_target(context.place, context.yaw_rad, context.samples, (BindingDerivative.VELOCITY,) * 3)
+        place, vertical = context.place, BindingDerivative.VELOCITY
+        clear_m = context.home_enu_m[2] + _CLEAR_M
+        if place[2] < clear_m and hypot(*context.velocity[:2]) > _SKIMS_M_S:
+            place, vertical = (*place[:2], clear_m), BindingDerivative.POSITION
+        kinds = (BindingDerivative.VELOCITY, BindingDerivative.VELOCITY, vertical)
+        braking = still_target(place, context.yaw_rad, context.samples, kinds)
         return PositionMotion(braking._replace(turns=False), limits)
 
     def arrived(self, context: TaskContext) -> bool:

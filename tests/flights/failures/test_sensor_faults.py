@@ -158,6 +158,26 @@ def test_a_magnetometer_that_comes_late_is_not_followed(sitl: Sitl, delay_s: flo
 
 @ON_SENSORS
 @pytest.mark.parametrize(
+    ("drift", "gps_first"),
+    [(17.0, True), *(pytest.param(drift, False, marks=pytest.mark.long) for drift in (17.0, -17.0, 5.0))],
+)
+def test_a_barometer_that_drifts_does_not_keep_a_vehicle_without_gps_in_the_air(
+    sitl: Sitl, drift: float, gps_first: bool
+) -> None:
+    sitl.takeoff(8.0)
+    if gps_first:
+        sitl.inject("gps", "off")
+        sitl.run(3.0)
+    sitl.inject("baro", "slow", 0, drift)
+    sitl.run(12.0)
+    sitl.inject("gps", "off")
+    sitl.wait_until(lambda: not sitl.armed, within=120.0)
+    assert sitl.path[:, 2].max() < 30.0
+    assert not sitl.said("Impact")
+
+
+@ON_SENSORS
+@pytest.mark.parametrize(
     ("unit", "why"), [("gyro", "gyroscope lost"), ("accel", "inertial sensors failed")], ids=["gyro", "accel"]
 )
 @pytest.mark.sitl(params={"COM_DISARM_LAND": 5.0})

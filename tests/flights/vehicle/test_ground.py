@@ -174,3 +174,16 @@ def test_geometric_law_lands_upright_in_wind(sitl_fleet: Callable[..., list[Sitl
     sitl.land()
     sitl.run(1.0)
     assert sitl.tilt_deg < 1.0
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.LAND])
+@pytest.mark.sitl(airborne=1.0, vehicle="jmavsim")
+def test_a_low_and_fast_vehicle_brakes_before_it_comes_down(sitl: Sitl, mode: Mode) -> None:
+    sitl.goto(80.0, 0.0, 0.3, wait=False)
+    sitl.run(3.0)
+    assert sitl.speed_m_s > 4.0
+    sitl.select(mode)
+    low_at_m_s = []
+    sitl.run(6.0, lambda: low_at_m_s.append(sitl.speed_m_s if sitl.position[2] < 0.05 else 0.0))
+    assert max(low_at_m_s) < 1.0
+    assert not sitl.said("Impact")
