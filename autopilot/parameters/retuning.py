@@ -157,19 +157,19 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
     """Fly four control samples; by attitude and on the path, too, if the law can."""
     references = still_horizon(controller.preview.samples)
-    memory = controller.initial(vehicle.hover_speed)
-    for sample, state in enumerate(_TRIED):
+    memory, speeds = controller.initial(vehicle.hover_speed), (vehicle.hover_speed,) * vehicle.rotors.count
+    hover, *others = [state._replace(rotor_speeds=speeds) for state in _TRIED]
+    for sample, state in enumerate((hover, *others)):
         memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)
     if isinstance(controller, AttitudeController):
         thrust_n = np.full(controller.preview.samples, vehicle.body.mass_kg * vehicle.gravity_m_s2)
         time_us = len(_TRIED) * controller.control_interval_us
         level = AttitudeDemand(references.position_enu_m, references.velocity_enu_m_s, thrust_n)
-        _, decision = controller.step_attitude(memory, time_us, AT_REST, level)
+        _, decision = controller.step_attitude(memory, time_us, hover, level)
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)
     if isinstance(controller, PathController) and controller.min_path_speed < 1.0:
         for sample in range(2):  # the second with a plan
-            memory, decision = controller.step_on_path(
-                memory, sample * controller.control_interval_us, AT_REST, references
-            )
+            time_us = sample * controller.control_interval_us
+            memory, decision = controller.step_on_path(memory, time_us, hover, references)
             check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)

@@ -75,10 +75,10 @@ def test_any_control_law_may_have_flown_before(sitl: Sitl) -> None:
     fall(sitl, 2)
 
 
-MUST_LAND = pytest.mark.sitl(vehicle="firefly", params={"CA_FAILURE_MODE": 2})
+MUST_LAND = pytest.mark.sitl(vehicle="s1000", controller="geometric-se3", params={"CA_FAILURE_MODE": 2})
 
 
-@pytest.mark.parametrize("mode", [1, pytest.param(2, marks=MUST_LAND, id="a hexarotor that must land")])
+@pytest.mark.parametrize("mode", [1, pytest.param(2, marks=MUST_LAND, id="an octorotor that must land")])
 @pytest.mark.sitl(airborne=3.0)
 def test_with_a_lost_rotor_only_landing_is_possible(sitl: Sitl, mode: int) -> None:
     sitl.run(0.4)
