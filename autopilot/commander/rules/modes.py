@@ -94,7 +94,7 @@ MODES: tuple[ModeRow, ...] = (
     ModeRow(Mode.STABILIZED, 7, 0, _TILT, "sticks to tilt, yaw rate and thrust"),
     ModeRow(Mode.ALTITUDE, 2, 0, _TILT, "sticks to tilt, yaw rate and climb rate; holds height"),
     ModeRow(Mode.POSITION, 3, 0, (Need.STICKS, Need.POSITION), "sticks to velocity; holds position"),
-    ModeRow(Mode.HOLD, AUTO, 3, _PLACE, "stops (if low and fast, at 1 m) and holds position; flies to reposition commands"),
+    ModeRow(Mode.HOLD, AUTO, 3, _PLACE, "stops (if low and fast, at 1 m) and holds; flies to reposition commands"),
     ModeRow(Mode.TAKEOFF, AUTO, 2, _PLACE, "climbs to the take-off height"),
     ModeRow(Mode.LAND, AUTO, 6, (), "descends here, then disarms; level without position", to_arm=False),
     ModeRow(Mode.RETURN, AUTO, 5, _PLACE, _HOMEWARD, to_arm=False),
