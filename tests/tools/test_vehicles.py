@@ -33,7 +33,14 @@ def test_every_vehicle_flies_by_its_file_alone(vehicle: str, trial: str, rms_m: 
     assert flown.error_m < rms_m
 
 
-@pytest.mark.parametrize(("vehicle", "trial"), [("r26", "lemniscate"), ("cf21", "loaded"), ("heavy30", "sensors")])
+@pytest.mark.parametrize(
+    ("vehicle", "trial"),
+    [
+        pytest.param("r26", "lemniscate", marks=pytest.mark.long),
+        ("cf21", "loaded"),
+        pytest.param("heavy30", "sensors", marks=pytest.mark.long),
+    ],
+)
 def test_the_baseline_flies_slow_rotors(vehicle: str, trial: str) -> None:
     flown = fly(load_vehicle(str(FILES / f"{vehicle}.toml")), trial, controller="geometric-se3")
     assert not flown.lost

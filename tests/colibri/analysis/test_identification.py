@@ -92,7 +92,7 @@ def _ulog(rows: Array, force: Array) -> Iterator[bytes]:
         yield sensing.encode(np.hstack([block[:, :1], sensed, np.zeros((len(block), len(SENSING_COLUMNS) - 4))]))
 
 
-@pytest.mark.parametrize("name", ["hummingbird", "firefly"])
+@pytest.mark.parametrize("name", ["hummingbird", pytest.param("firefly", marks=pytest.mark.long)])
 def test_numbers_become_those_of_the_vehicle_in_the_log(log_of: Callable[[str], Path], name: str) -> None:
     found = identify(read_motion(log_of(name)), another(name))
     off = errors(found, name)

@@ -84,7 +84,12 @@ SHAPES: dict[str, Callable[[Array], Array]] = {
 
 
 @pytest.mark.parametrize(
-    ("shape", "held"), [*((shape, False) for shape in SHAPES), *((shape, True) for shape in ("noise", "steps"))]
+    ("shape", "held"),
+    [
+        *((shape, False) for shape in SHAPES),
+        *((shape, True) for shape in ("steps",)),
+        pytest.param("noise", True, marks=pytest.mark.long),
+    ],
 )
 def test_an_hour_looks_the_same_over_time(shape: str, held: bool) -> None:
     rows: Array = np.stack([HOUR, SHAPES[shape](HOUR)], axis=1)

@@ -68,7 +68,7 @@ def test_a_certificate_that_was_tampered_with_is_not_confirmed(
     assert margin(exact_loop(), spoil(CERTIFIED.invariant.proof)) <= 0.0
 
 
-@pytest.mark.parametrize(("name", "factor"), [("commanded", 0.8), ("unsure", 4.0)])
+@pytest.mark.parametrize(("name", "factor"), [pytest.param("commanded", 0.8, marks=pytest.mark.long), ("unsure", 4.0)])
 def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(name: str, factor: float) -> None:
     _, numbers, proof, _ = CERTIFIED.invariant
     other = numbers._replace(**{name: (factor * np.array(getattr(numbers, name))).tolist()})

@@ -26,7 +26,7 @@ KEPT = "; logs are in {}"
     [
         pytest.param("colibri", signal.SIGINT, 130, "interrupted", marks=pytest.mark.long),
         ("colibri", signal.SIGTERM, 143, "ended by SIGTERM"),
-        ("colibri", signal.SIGHUP, 129, "ended by SIGHUP"),
+        pytest.param("colibri", signal.SIGHUP, 129, "ended by SIGHUP", marks=pytest.mark.long),
         ("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM"),
         ("autopilot", signal.SIGKILL, 1, "the autopilot was killed by SIGKILL"),
         pytest.param("plant", signal.SIGKILL, 1, "the plant was killed by SIGKILL", marks=pytest.mark.long),
@@ -45,7 +45,7 @@ def test_a_signal_ends_the_flight_with_a_line(
     assert not any(each.is_running() for each in children)
 
 
-@pytest.mark.parametrize("name", ["plant", "autopilot"])
+@pytest.mark.parametrize("name", [pytest.param("plant", marks=pytest.mark.long), "autopilot"])
 def test_a_stopped_process_holds_up_neither_signal_nor_end(tmp_path: Path, name: str) -> None:
     flight, children = flying(tmp_path)
     (held,) = (each for each in children if each.name() == name)

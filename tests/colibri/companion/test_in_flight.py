@@ -200,13 +200,15 @@ AS_IT_IS = FlightLimits()
     [
         ("late states", lambda ride: setattr(ride.trouble, "down", True), AS_IT_IS),
         ("estimate lost", lambda ride: _say(ride, "ESTIMATOR_STATUS", 0, 0, *(0.0,) * 8), AS_IT_IS),
-        ("estimate jumped", _jump, AS_IT_IS),
+        pytest.param("estimate jumped", _jump, AS_IT_IS, marks=pytest.mark.long),
         ("control law", lambda ride: setattr(ride.law, "raises", True), AS_IT_IS),
         ("overloaded", lambda ride: setattr(ride, "polls_every_us", 12_000), AS_IT_IS),
-        ("overloaded", lambda ride: setattr(ride, "polls_every_us", 212_000), AS_IT_IS),
-        ("box", _blow, TIGHT_BOX),
+        pytest.param(
+            "overloaded", lambda ride: setattr(ride, "polls_every_us", 212_000), AS_IT_IS, marks=pytest.mark.long
+        ),
+        pytest.param("box", _blow, TIGHT_BOX, marks=pytest.mark.long),
         ("tilt", _blow, TIGHT_TILT),
-        ("error", _blow, TIGHT_ERROR),
+        pytest.param("error", _blow, TIGHT_ERROR, marks=pytest.mark.long),
         ("battery", lambda ride: _say(ride, "SYS_STATUS", *(0,) * 4, 10_000, -1, 10, *(0,) * 6), AS_IT_IS),
         ("fence", lambda ride: _say(ride, "SYS_STATUS", FENCE, FENCE, 0, 0, 12_000, -1, 90, *(0,) * 6), AS_IT_IS),
         ("failsafe", _failsafe, AS_IT_IS),

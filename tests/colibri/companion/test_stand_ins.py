@@ -35,7 +35,7 @@ def test_it_flies_a_track() -> None:
 @pytest.mark.parametrize(
     "numbers",
     [
-        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06),
+        pytest.param(Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06), marks=pytest.mark.long),
         Numbers(lag_s=(0.11, 0.11, 0.3), late_s=0.04),
         pytest.param(Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02), marks=pytest.mark.long),
         pytest.param(Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04), marks=pytest.mark.long),

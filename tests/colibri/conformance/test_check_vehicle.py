@@ -24,6 +24,7 @@ def with_thrust(ratio: float) -> Vehicle:
     return vehicle.replace("body.mass_kg", float(vehicle.max_wrench()[0]) / vehicle.gravity_m_s2 / ratio)
 
 
+@pytest.mark.long  # machine code of its own
 def test_a_law_of_ten_hertz_flies_on_sensors() -> None:
     assert fly(HUMMINGBIRD, TRIALS["sensors"], {"profile": "thesis"}).error_m < 0.6
 

@@ -102,7 +102,10 @@ FLOWN: dict[str, tuple[Any, str, float, float]] = {
 }
 
 
-@pytest.mark.parametrize(("event", "column", "low", "high"), FLOWN.values(), ids=list(FLOWN))
+@pytest.mark.parametrize(
+    ("event", "column", "low", "high"),
+    [pytest.param(*each, id=name, marks=pytest.mark.long if "eight" in name else ()) for name, each in FLOWN.items()],
+)
 def test_an_event_acts_from_its_time_on(event: Any, column: str, low: float, high: float) -> None:
     options: dict[str, Any] = {"duration": 0.4, "vehicle": "hummingbird"}
     if "=8" in event:  # by the law with less machine code for other numbers of rotors

@@ -51,8 +51,8 @@ def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
         {"id": "colibri/Track-v0", "action": "rates", "preview": 3},
         {"id": "colibri/Hover-v0", "action": "velocity", "observation": "estimate", "preview": 2, "history": 2},
         {"id": "colibri/Track-v0", "action": "position", "draw": _DRAW},
-        {"id": "colibri/Recover-v0", "vehicle": "firefly", "history": 2},
-        {"id": "colibri/Recover-v0", "action": "attitude"},
+        pytest.param({"id": "colibri/Recover-v0", "vehicle": "firefly", "history": 2}, marks=pytest.mark.long),
+        pytest.param({"id": "colibri/Recover-v0", "action": "attitude"}, marks=pytest.mark.long),
         {"id": "colibri/Race-v0", "action": "rates"},
     ],
 )
@@ -100,7 +100,7 @@ def test_restored_episodes_continue_with_the_same_bits() -> None:
         QuadrotorEnv().restore(kept)
 
 
-@pytest.mark.parametrize("observation", ["truth", "estimate"])
+@pytest.mark.parametrize("observation", [pytest.param("truth", marks=pytest.mark.long), "estimate"])
 def test_actions_through_the_autopilot_are_exact(observation: str) -> None:
     env, other = (QuadrotorEnv(action="velocity", observation=observation, draw=_DRAW) for _ in range(2))
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 4)).astype(np.float32)

@@ -228,7 +228,7 @@ def test_failed_tests_of_similar_names_keep_their_flights(pytester: pytest.Pytes
     assert len(tests) == len(folders) == 5
 
 
-@pytest.mark.parametrize(("logging", "workers"), [("no", ("-n", "1")), ("all", ())])
+@pytest.mark.parametrize(("logging", "workers"), [pytest.param("no", ("-n", "1"), marks=pytest.mark.long), ("all", ())])
 def test_junit_has_folder_replay_and_picture_in_one_text(
     pytester: pytest.Pytester, logging: str, workers: tuple[str, ...]
 ) -> None:

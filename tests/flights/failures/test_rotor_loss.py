@@ -144,7 +144,7 @@ def test_a_rotor_lost_at_speed_is_survived(sitl: Sitl) -> None:
     fall(sitl, 0, peak_deg=90.0, settled_deg=25.0, away_m=50.0)
 
 
-@pytest.mark.parametrize("memory", [True, False])
+@pytest.mark.parametrize("memory", [True, pytest.param(False, marks=pytest.mark.long)])
 @pytest.mark.sitl(airborne=5.0)
 def test_a_restarted_autopilot_lands_on_three_rotors(sitl: Sitl, memory: bool) -> None:
     sitl.run(0.4)

@@ -113,9 +113,9 @@ def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
     ("fault", "says"),
     [
         (Fault("accel", "stuck"), "Failsafe activated: accelerometer lost, land"),
-        (Fault("accel", "garbage"), "Failsafe activated: accelerometer lost, land"),
+        pytest.param(Fault("accel", "garbage"), "Failsafe activated: accelerometer lost, land", marks=pytest.mark.long),
         (Fault("gyro", "off"), "Failsafe activated: gyroscope lost, land"),
-        (Fault("gyro", "garbage"), "Failsafe activated: gyroscope lost, land"),
+        pytest.param(Fault("gyro", "garbage"), "Failsafe activated: gyroscope lost, land", marks=pytest.mark.long),
         (Fault("gyro", "garbage", (4.0,)), "Failsafe activated: gyroscope lost, land"),
         (Fault("baro", "off"), "Warning: barometer lost"),
     ],
@@ -194,7 +194,7 @@ def test_without_an_inertial_sensor_a_landed_vehicle_stays_down(sitl: Sitl, unit
     assert not sitl.said("Impact")
 
 
-@pytest.mark.parametrize(("kind", "late_s"), [("stuck", 0.0), ("delayed", 0.03)])
+@pytest.mark.parametrize(("kind", "late_s"), [("stuck", 0.0), pytest.param("delayed", 0.03, marks=pytest.mark.long)])
 def test_a_gyroscope_that_fails_in_a_turn_is_not_flown_against(hovering: Hovering, kind: str, late_s: float) -> None:
     sitl = hovering("7@188", 5.0)
     sitl.goto(40.0, 0.0, 5.0, wait=False)

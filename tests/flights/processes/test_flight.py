@@ -21,7 +21,7 @@ FEW_STARTS = 6  # of the 50 that `make test-long` flies, for longer
 @pytest.mark.parametrize(
     ("track", "duration_s", "reach_m"),
     [
-        ("spiral", 22, 0.001),
+        pytest.param("spiral", 22, 0.001, marks=pytest.mark.long),
         ("lemniscate", 26, 0.005),
         pytest.param("lemniscate:yaw=fixed", 26, 0.002, marks=pytest.mark.long),
     ],

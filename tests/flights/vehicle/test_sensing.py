@@ -103,7 +103,7 @@ def test_without_compensation_the_delay_is_too_much(sitl: Sitl) -> None:
     sitl.wait_until(lambda: abs(sitl.euler[0]) + abs(sitl.euler[1]) > 1.5, within=6.0)
 
 
-@pytest.mark.parametrize("feedback", ["state", "sensors"])
+@pytest.mark.parametrize("feedback", [pytest.param("state", marks=pytest.mark.long), "sensors"])
 def test_with_a_delay_it_takes_off_and_lands(sitl_fleet: Callable[..., list[Sitl]], feedback: str) -> None:
     (sitl,) = sitl_fleet(1, feedback=feedback, latency=LATENCY_MS, seed=3)
     sitl.takeoff(1.0)

@@ -199,7 +199,7 @@ def test_stabilized_by_hand(sitl: Sitl) -> None:
     assert sitl.speed_m_s < 0.3
 
 
-@pytest.mark.parametrize("mode", [Mode.ALTITUDE, Mode.POSITION])
+@pytest.mark.parametrize("mode", [Mode.ALTITUDE, pytest.param(Mode.POSITION, marks=pytest.mark.long)])
 @pytest.mark.sitl(airborne=None)
 def test_takeoff_and_landing_by_hand(sitl: Sitl, mode: Mode) -> None:
     steer(sitl, EVERY_S, mode)
