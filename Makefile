@@ -155,10 +155,14 @@ pages: setup
 	for page in $(PAGES); do $(BIN)/python -m tools.pages $$page docs || exit 1; done
 
 # The pages of docs/ as a site, in site/: a link or an anchor that leads nowhere fails. Nothing is fetched, then or by readers.
-docs: setup
-	$(BIN)/python -m pytest -q -p no:cacheprovider tests/docs/test_links.py
+docs: setup .venv/.docs
+	$(BIN)/python -m pytest -q -p no:cacheprovider -m "site or not site" tests/docs/test_links.py tests/docs/test_site.py
 	$(BIN)/zensical build --strict
 	@echo "read it at site/index.html; with search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory site"
+
+.venv/.docs: .venv/.ready requirements-docs.lock
+	@$(BIN)/python $(PIP) --quiet --no-compile --no-deps --require-hashes -r requirements-docs.lock
+	@touch $@
 
 # The locks name versions and hashes, no registry. Needs uv.
 lock:
@@ -166,6 +170,8 @@ lock:
 	  --extra dev pyproject.toml -o requirements.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --group build --constraint requirements.lock pyproject.toml -o requirements-fly.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --group docs --constraint requirements.lock -o requirements-docs.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra clients pyproject.toml -o requirements-clients.lock
 

@@ -15,6 +15,8 @@ _ASKED_FOR_BY_STYLE = re.compile(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//")
 _MADE_BY_SCRIPTS = ("mermaid", "glightbox", "pyodide", 'data-md-component="source"')
 """What the theme's script would fetch from another host: none of it may be on a page."""
 
+pytestmark = pytest.mark.site
+
 
 def build(folder: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "zensical", "build", "--strict"]
@@ -41,7 +43,6 @@ def test_the_site_is_built_and_asks_nobody(project: Path) -> None:
         assert not _ASKED_FOR_BY_STYLE.search(style.read_text(encoding="utf-8")), style.name
 
 
-@pytest.mark.long
 def test_a_broken_link_fails(project: Path) -> None:
     with (project / "docs" / "rotor-loss.md").open("a", encoding="utf-8") as page:
         page.write("\n[nowhere](nowhere.md) and [no heading](flight.md#no-heading)\n")
