@@ -75,7 +75,9 @@ def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, ran: Ran) -> Non
 
 
 def test_a_flight_of_six_rotors_is_recorded_and_replayed(tmp_path: Path) -> None:
-    fly(tmp_path, "line", "--vehicle", "firefly", "--link", "memory", "--duration", "1")
+    fly(
+        tmp_path, "line", "--vehicle", "firefly", "--controller", "geometric-se3", "--link", "memory", "--duration", "1"
+    )
     assert replay_flight(tmp_path) == (250, 996_000, None)
     samples = read_recording(tmp_path)
     assert samples["omega6"].min() > 83.8

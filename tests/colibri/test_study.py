@@ -176,6 +176,7 @@ def test_a_study_from_the_command_line(tmp_path: Path, monkeypatch: pytest.Monke
     assert [line.split(",")[0] for line in lines] == ["start", *flown]
 
 
+@pytest.mark.long
 def test_a_flight_of_two_studies_is_flown_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[object] = []
 

@@ -140,6 +140,7 @@ def test_a_flood_does_not_lock_out_other_stations(flood: str) -> None:
     assert flight.copter.parameters["VEH_MASS"] == pytest.approx(1.05 * parameter.default)
 
 
+@pytest.mark.long
 def test_nothing_is_imported_in_flight() -> None:
     """Imports take 0.2 s where SciPy is among them."""
     assert subprocess.check_output([sys.executable, "-c", ALL_ARE_USED], text=True).split() == []

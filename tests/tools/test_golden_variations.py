@@ -30,6 +30,7 @@ def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: t
     return fly(variation, tmp_path, link, only)
 
 
+@pytest.mark.long
 @begins_as_recorded
 def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
     only = [f"--only={name}" for name in FEW]

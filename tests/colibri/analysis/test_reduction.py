@@ -101,6 +101,7 @@ def test_an_hour_looks_the_same_over_time(shape: str, held: bool) -> None:
     assert different(all_of_it, kept) < MAX_DIFFERENT
 
 
+@pytest.mark.long
 def test_an_hour_looks_the_same_in_space() -> None:
     """Laps of 8 s at up to 6 m/s², each a little further on."""
     angle = 2.0 * np.pi * HOUR / 8.0

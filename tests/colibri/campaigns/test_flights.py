@@ -100,6 +100,7 @@ def test_what_cannot_be_flown_together_is_a_row() -> None:
     assert refused[1:4] == (Verdict.REFUSED, "body.mass_kg: Expected `float` > 0.0", (None,))
 
 
+@pytest.mark.long
 def test_keys_are_changed_over_udp_too() -> None:
     tables: list[dict[str, Any]] = [{"link": link, "duration": 0.2} for link in ("udp", "memory")]
     udp, memory = (flown(fly=fly, grid={"track": ["hover"], MASS: [0.6]}) for fly in tables)

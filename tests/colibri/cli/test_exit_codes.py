@@ -27,7 +27,7 @@ KEPT = "; logs are in {}"
         pytest.param("colibri", signal.SIGINT, 130, "interrupted", marks=pytest.mark.long),
         ("colibri", signal.SIGTERM, 143, "ended by SIGTERM"),
         pytest.param("colibri", signal.SIGHUP, 129, "ended by SIGHUP", marks=pytest.mark.long),
-        ("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM"),
+        pytest.param("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM", marks=pytest.mark.long),
         ("autopilot", signal.SIGKILL, 1, "the autopilot was killed by SIGKILL"),
         pytest.param("plant", signal.SIGKILL, 1, "the plant was killed by SIGKILL", marks=pytest.mark.long),
         pytest.param("autopilot", signal.SIGHUP, 1, "the autopilot was ended by SIGHUP", marks=pytest.mark.long),

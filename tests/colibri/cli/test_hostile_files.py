@@ -141,7 +141,8 @@ def test_a_nudge_is_a_short_distance(
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "line"), [("NUMBA_DISABLE_JIT", "1", "must be unset"), ("MPLBACKEND", "nonsense", "")]
+    ("name", "value", "line"),
+    [("NUMBA_DISABLE_JIT", "1", "must be unset"), pytest.param("MPLBACKEND", "nonsense", "", marks=pytest.mark.long)],
 )
 def test_variables_of_other_packages(name: str, value: str, line: str, tmp_path: Path) -> None:
     words = f"fly hover {FLOWN}".format(folder=tmp_path).split()

@@ -155,6 +155,7 @@ def test_the_fixture_flies_events_of_plant_and_station(sitl: colibri.Sitl) -> No
     sitl.wait_until(lambda: sitl.mode == "land", within=10.0)
 
 
+@pytest.mark.long
 def test_modes_and_setpoints_fly_beside_ground_stations(tmp_path: Path) -> None:
     words = ["fly", "hover", "--duration", "3.5", "--link", "udp", "--gcs", "udpin:127.0.0.1:0", "--speed", "max"]
     events = ["--event", "0.5:setpoint=1,0,3", "--event", "0.7:mode=offboard", "--event", "0.8:payload=0.05"]

@@ -14,6 +14,7 @@ from tests.support.refusals import refusal_of
 HOVER: dict[str, Any] = {"duration": 0.3, "start": {"x": 0.3}}
 
 
+@pytest.mark.long
 def test_both_links_and_python_fly_the_same_parameters(tmp_path: Path) -> None:
     plain = colibri.fly("hover", **HOVER)
     flights = [colibri.fly("hover", params=params, **HOVER) for params in ({"LPV_R_NEXT": 0.3}, ["LPV_R_NEXT=0.3"])]

@@ -60,6 +60,7 @@ def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
     assert any("Takeoff" in text for text in in_memory[1])
 
 
+@pytest.mark.long
 def test_the_same_flight_of_processes_from_scratch() -> None:
     def hover(sitl: Sitl) -> None:
         sitl.run(0.2)

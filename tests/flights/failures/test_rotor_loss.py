@@ -75,10 +75,11 @@ def test_any_control_law_may_have_flown_before(sitl: Sitl) -> None:
     fall(sitl, 2)
 
 
-MUST_LAND = pytest.mark.sitl(vehicle="s1000", controller="geometric-se3", params={"CA_FAILURE_MODE": 2})
+HEXAROTOR = pytest.mark.sitl(vehicle="firefly", controller="geometric-se3")  # the law with less machine code
+MUST_LAND = pytest.mark.sitl(params={"CA_FAILURE_MODE": 2})
 
 
-@pytest.mark.parametrize("mode", [1, pytest.param(2, marks=MUST_LAND, id="an octorotor that must land")])
+@pytest.mark.parametrize("mode", [1, pytest.param(2, marks=[HEXAROTOR, MUST_LAND], id="a hexarotor that must land")])
 @pytest.mark.sitl(airborne=3.0)
 def test_with_a_lost_rotor_only_landing_is_possible(sitl: Sitl, mode: int) -> None:
     sitl.run(0.4)
@@ -106,14 +107,11 @@ LOST = [
     pytest.param(
         *(rotor, remaining),
         id=f"{vehicle}-{rotor}",
-        marks=[
-            pytest.mark.sitl(vehicle=vehicle),
-            *([] if (vehicle, rotor) == ("firefly", 0) else [pytest.mark.long]),
-        ],
+        marks=[pytest.mark.sitl(vehicle=vehicle), pytest.mark.long],
     )
     for vehicle, (remaining, rotors) in REMAINING.items()
     for rotor in rotors
-]
+] + [pytest.param(0, REMAINING["firefly"][0], marks=HEXAROTOR, id="se3")]
 
 
 @pytest.mark.parametrize(("rotor", "remaining"), LOST)

@@ -91,6 +91,7 @@ def test_before_the_first_estimate_commands_are_denied(sitl: Sitl) -> None:
     sitl.arm()
 
 
+@pytest.mark.long
 @pytest.mark.sitl(feedback="sensors", seed=1)
 def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
     bias = (0.0, 0.0, 2.0)
@@ -164,7 +165,7 @@ def test_a_magnetometer_that_comes_late_is_not_followed(sitl: Sitl, delay_s: flo
 def test_a_barometer_that_drifts_does_not_keep_a_vehicle_without_gps_in_the_air(
     sitl: Sitl, drift: float, gps_first: bool
 ) -> None:
-    sitl.takeoff(8.0)
+    sitl.takeoff(4.0)
     if gps_first:
         sitl.inject("gps", "off")
         sitl.run(3.0)

@@ -40,6 +40,7 @@ def beyond(flown: LoadedTrack, margin: float) -> float:
     return max(float(demand.beyond(margin).max()) for demand in demands)
 
 
+@pytest.mark.long
 def test_a_turn_from_the_floor_to_the_floor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 25)
     flown = loaded(tmp_path, TURN)
