@@ -28,7 +28,7 @@ setup: .venv/.ready
 	@$(BIN)/colibri compile flight
 	@touch $@
 
-# What tests, docs and every option need, installed while the rest of the kernels is compiled.
+# What `make test` and every option need, installed while the rest of the kernels is compiled.
 .venv/.ready: .venv/.flies requirements.lock
 	@echo "adding to .venv from requirements.lock (once, about two minutes)"
 	@($(BIN)/python $(PIP) --no-compile --no-deps --require-hashes -r requirements.lock $(COUNT)) & pip=$$!; \
@@ -50,11 +50,11 @@ test: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # What takes long and shows more of the same: whole commands timed, kills in missions, 500 items over a bad link.
-test-long: setup
+test-long: .venv/.more
 	$(BIN)/python -m pytest -m long -n 2 --dist worksteal
 
 # The page of `colibri view` in Chromium, which draws without a GPU: about a minute.
-test-view: setup
+test-view: .venv/.more
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
 	  { echo "make test-view needs a Chromium: apt-get install chromium" >&2; exit 2; }
 	$(BIN)/python -m pytest -m view tests/colibri/view/browser
@@ -155,13 +155,13 @@ pages: setup
 	for page in $(PAGES); do $(BIN)/python -m tools.pages $$page docs || exit 1; done
 
 # The pages of docs/ as a site, in site/: a link or an anchor that leads nowhere fails. Nothing is fetched, then or by readers.
-docs: setup .venv/.docs
+docs: .venv/.more
 	$(BIN)/python -m pytest -q -p no:cacheprovider -m "site or not site" tests/docs/test_links.py tests/docs/test_site.py
 	$(BIN)/zensical build --strict
 	@echo "read it at site/index.html; with search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory site"
 
-.venv/.docs: .venv/.ready requirements-docs.lock
-	@$(BIN)/python $(PIP) --quiet --no-compile --no-deps --require-hashes -r requirements-docs.lock
+.venv/.more: .venv/.ready requirements-more.lock
+	@$(BIN)/python $(PIP) --quiet --no-compile --no-deps --require-hashes -r requirements-more.lock
 	@touch $@
 
 # The locks name versions and hashes, no registry. Needs uv.
@@ -171,7 +171,7 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --group build --constraint requirements.lock pyproject.toml -o requirements-fly.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
-	  --group docs --constraint requirements.lock -o requirements-docs.lock
+	  --group more --constraint requirements.lock -o requirements-more.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra clients pyproject.toml -o requirements-clients.lock
 

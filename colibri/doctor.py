@@ -44,7 +44,7 @@ class Finding(NamedTuple):
 
 
 PACKAGE = "colibri-sitl"
-FOR_DEVELOPERS = ("bench", "clients", "dev", "view-tests")  # extras that only a clone can use
+FOR_DEVELOPERS = ("bench", "clients", "dev")  # extras that only a clone can use
 _LOCK = "requirements.lock"
 _PINNED = re.compile(r"^[\w.-]+==[^\\\n]+", re.MULTILINE)
 _SHOWN = 3

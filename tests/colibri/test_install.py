@@ -70,9 +70,9 @@ def test_what_flies_is_locked_as_for_development() -> None:
         set((ROOT / name).read_text().splitlines()) for name in ("requirements-fly.lock", "requirements.lock")
     )
     assert flying <= developing
-    documenting = (ROOT / "requirements-docs.lock").read_text().splitlines()
-    shared = {line.partition("==")[0] for line in developing} & {line.partition("==")[0] for line in documenting}
-    assert {line for line in documenting if line.partition("==")[0] in shared} <= developing
+    more = (ROOT / "requirements-more.lock").read_text().splitlines()
+    shared = {line.partition("==")[0] for line in developing} & {line.partition("==")[0] for line in more}
+    assert {line for line in more if line.partition("==")[0] in shared} <= developing
     needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {Requirement(one).name for one in needed} <= {line.partition("==")[0] for line in flying}
 
