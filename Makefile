@@ -160,7 +160,9 @@ docs: .venv/.more
 	$(BIN)/zensical build --strict
 	@echo "read it at site/index.html; with search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory site"
 
+# What only the site, the notebook in Jupyter and the browser need.
 .venv/.more: .venv/.ready requirements-more.lock
+	@echo "adding to .venv from requirements-more.lock (once, seconds)"
 	@$(BIN)/python $(PIP) --quiet --no-compile --no-deps --require-hashes -r requirements-more.lock
 	@touch $@
 

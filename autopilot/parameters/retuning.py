@@ -158,8 +158,9 @@ def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
     """Fly four control samples; by attitude and on the path, too, if the law can."""
     references = still_horizon(controller.preview.samples)
     memory, speeds = controller.initial(vehicle.hover_speed), (vehicle.hover_speed,) * vehicle.rotors.count
-    hover, *others = [state._replace(rotor_speeds=speeds) for state in _TRIED]
-    for sample, state in enumerate((hover, *others)):
+    states = [state._replace(rotor_speeds=speeds) for state in _TRIED]
+    hover = states[0]
+    for sample, state in enumerate(states):
         memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)
     if isinstance(controller, AttitudeController):

@@ -20,15 +20,15 @@ _INFLATED_M = 100.0
 _DRIFTS_US = 10_000_000  # rejected again so soon after an acceptance by force, the pressure drifts
 _DRIFTED_US = 60_000_000  # then it is rejected for so long,
 _ALONE_US = 1_000_000  # and while the height of GPS has not been accepted for so long
-_MISLED_M, _MISLED_M_S = 3.0, 1.0
+_MISLED_M, _MISLED_M_S = 3.0, 1.0  # errors of height and climb rate by a drift
 _TYPICAL_PA = 95e3
 
 
 class BarometerFusion(FusedInstrument):
     """The barometer of one flight; `height_m` is of the last pressure.
 
-    A pressure that drifts steadily is followed by a filter that has nothing else: without GPS, the vehicle would climb
-    for ever. So a barometer that has been seen to drift is not used alone.
+    Without GPS the filter follows a pressure that drifts, and the vehicle climbs without end. So a barometer with a
+    detected drift is not used without GPS.
     """
 
     part, name, numbers = "barometer", "pressure", 1
@@ -73,7 +73,7 @@ class BarometerFusion(FusedInstrument):
         return None if accepted else Reason.INNOVATION
 
     def _doubt(self, P: Array) -> None:
-        """Let the height be unknown, if GPS does not find it: a drift has moved it and its rate."""
+        """Inflate the variances of height and climb rate; without GPS both then count as unknown."""
         update.inflate_covariance(P, POSITION + 2, 1, square(_MISLED_M))
         update.inflate_covariance(P, VELOCITY + 2, 1, square(_MISLED_M_S))
 

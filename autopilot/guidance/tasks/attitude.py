@@ -18,7 +18,7 @@ _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
 _MAX_LIFT_M_S2, _MAX_OFFSET_M_S2 = 6.0, 4.0
 _MIN_UPRIGHT = 0.5
 _RESTS_M_S = 0.025
-_WRONG_BELOW_M, _TWICE_M, _FASTEST_M_S = 3.0, 10.0, 2.0  # an estimate below the ground doubles the descent each 10 m
+_WRONG_BELOW_M, _TWICE_M, _FASTEST_M_S = 3.0, 10.0, 2.0  # margin under the ground; twice as fast 10 m farther; limit
 
 
 class TiltLoop:
@@ -105,7 +105,8 @@ class DescentTask(EndlessTask):
 
     def update(self, context: TaskContext) -> AttitudeMotion:
         under_m = max(context.ground_m - _WRONG_BELOW_M - context.place[2], 0.0)
-        speed_m_s = min(sinking_m_s(context) * (1.0 + under_m / _TWICE_M), max(_FASTEST_M_S, sinking_m_s(context)))
+        slow_m_s = sinking_m_s(context)
+        speed_m_s = max(min(slow_m_s * (1.0 + under_m / _TWICE_M), _FASTEST_M_S), slow_m_s)
         reference, _ = vertically(context, -speed_m_s, None)
         thrust_n = self._loop.thrust_n(reference, context)
         motion = self._tilt.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
