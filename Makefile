@@ -28,11 +28,11 @@ setup: .venv/.ready
 	@$(BIN)/colibri compile flight
 	@touch $@
 
-# What `make test` and every option need, installed while the rest of the kernels is compiled.
+# What `make test` and every option need, installed while more kernels are compiled; few tests fly profile `path`.
 .venv/.ready: .venv/.flies requirements.lock
 	@echo "adding to .venv from requirements.lock (once, about two minutes)"
 	@($(BIN)/python $(PIP) --no-compile --no-deps --require-hashes -r requirements.lock $(COUNT)) & pip=$$!; \
-	  $(BIN)/colibri compile; code=$$?; wait $$pip && exit $$code
+	  $(BIN)/colibri compile thesis sensors tests; code=$$?; wait $$pip && exit $$code
 	@$(BIN)/colibri sitl --plant-port 0 --gcs udpin:127.0.0.1:0 --speed max --duration 0.1 --quiet
 	@touch $@
 

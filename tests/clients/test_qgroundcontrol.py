@@ -97,6 +97,7 @@ def test_it_gets_all_that_it_asks_for_when_it_connects(tmp_path: Path) -> None:
             assert (count.count, count.mission_type) == (0, mission_type)
 
 
+@pytest.mark.long
 def test_it_flies_where_it_is_told_to(tmp_path: Path) -> None:
     with connected(tmp_path) as (station, flown):
         seen = flown.seen

@@ -57,6 +57,7 @@ def test_the_wheel_has_colibri_and_nothing_else(wheel: Path) -> None:
     assert {"colibri/autopilot/profiles/flight.toml", "colibri/plant/vehicle/models/hummingbird.toml"} <= names
 
 
+@pytest.mark.long
 def test_a_wheel_of_the_source_distribution_is_the_same(wheel: Path, sdist: Path, tmp_path: Path) -> None:
     with tarfile.open(sdist) as file:
         file.extractall(tmp_path, filter="data")
@@ -91,6 +92,7 @@ def test_a_checkout_without_links_is_not_built(tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.long
 def test_no_file_is_loaded_under_two_names() -> None:
     command = [sys.executable, "-c", EVERY_MODULE, str(ROOT)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -40,7 +40,8 @@ def test_it_flies_on_or_lands(sitl: Sitl, place: str, situation: str, times: flo
     assert text.startswith(said)
 
 
-@pytest.mark.parametrize("times", [pytest.param(1, marks=pytest.mark.long), inf])
+@pytest.mark.long
+@pytest.mark.parametrize("times", [1, inf])
 def test_without_an_estimator_it_flies_on_or_lands_blind(times: float) -> None:
     with airborne(Feedback.SENSORS) as flight:
         outcome, said = flown(flight, "hover", "autopilot.estimation.estimator:Estimator._take_in", times)

@@ -192,6 +192,7 @@ def test_home_and_origin_are_reported_as_they_change(sitl: Sitl) -> None:
     assert (home.latitude, home.longitude, home.altitude) == (*place.values(), 490_000)
 
 
+@pytest.mark.long
 @AS_ARDUPILOT
 def test_the_vehicle_looks_along_its_way(sitl: Sitl) -> None:
     sitl.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, float(mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT), 1e5)

@@ -201,7 +201,7 @@ TABLES = st.recursive(
 )
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(st.text(max_size=12), st.dictionaries(st.text("ab_s1é", max_size=30), TABLES, max_size=8))
 def test_any_table_has_parameters(name: str, table: dict[str, Any]) -> None:
     profile = msgspec.structs.replace(FLIGHT, controller=name + "?", controllers={table_of(name + "?"): table})

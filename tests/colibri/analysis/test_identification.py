@@ -103,6 +103,7 @@ def test_numbers_become_those_of_the_vehicle_in_the_log(log_of: Callable[[str], 
     assert all(error < 0.1 * size for quantity, _, size, error in found.held_out if quantity != "drag")  # gusts
 
 
+@pytest.mark.long
 def test_a_log_of_px4_without_rotor_speeds_tells_the_same(log_of: Callable[[str], Path], tmp_path: Path) -> None:
     log = written(tmp_path / "px4.ulg", "firefly", read_motion(log_of("firefly")), 250.0)
     found = identify(read_motion(log), another("firefly"))

@@ -30,10 +30,10 @@ SUMMARY = FrameCount(1.0, 1, 0)
 MAX_BYTES_A_SAMPLE = 100  # a row of the table alone has 216, and its text 500
 
 
-@pytest.fixture(scope="module")
-def plan(tmp_path_factory: pytest.TempPathFactory) -> FlightPlan:
+@pytest.fixture(scope="module", params=["flight", pytest.param("path", marks=pytest.mark.long)])
+def plan(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> FlightPlan:
     out = tmp_path_factory.mktemp("flown")
-    plan = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", feedback="sensors", duration=5.0, out=out))
+    plan = FlightPlan.of(FlightSpec.of("lemniscate", profile=request.param, feedback="sensors", duration=5.0, out=out))
     fly_locally(plan)
     return plan
 
@@ -136,7 +136,7 @@ def test_figures_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.M
 
 def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
     lasts_s = plan.spec.duration
-    longer = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", duration=rounds * lasts_s, out=out))
+    longer = FlightPlan.of(FlightSpec.of("lemniscate", profile=plan.spec.profile, duration=rounds * lasts_s, out=out))
     out.mkdir()
     log = log_of(plan.out)
     with (out / "flight.ulg").open("wb") as file:

@@ -29,6 +29,7 @@ def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProces
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")

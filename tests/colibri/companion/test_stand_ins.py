@@ -32,14 +32,15 @@ def test_it_flies_a_track() -> None:
     assert errors.rmse_m() < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "numbers",
     [
-        pytest.param(Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06), marks=pytest.mark.long),
+        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06),
         Numbers(lag_s=(0.11, 0.11, 0.3), late_s=0.04),
-        pytest.param(Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02), marks=pytest.mark.long),
-        pytest.param(Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04), marks=pytest.mark.long),
-        pytest.param(Numbers(lag_s=(0.028, 0.028, 0.3), late_s=0.055), marks=pytest.mark.long),
+        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02),
+        Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04),
+        Numbers(lag_s=(0.028, 0.028, 0.3), late_s=0.055),
     ],
 )
 def test_px4_s_rates_may_follow_late_and_overshoot(numbers: Numbers) -> None:
@@ -58,7 +59,8 @@ def test_px4_s_rates_may_follow_late_and_overshoot(numbers: Numbers) -> None:
     assert max(turning[-500:]) < max(turning[:2000])
 
 
-@pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("made", [Px4, ArduPilot])
 def test_the_hover_thrust_is_refined_in_flight(made: Callable[[], StandIn]) -> None:
     vehicle = made()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=14.0))

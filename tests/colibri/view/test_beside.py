@@ -69,6 +69,7 @@ def test_a_flight_beside_its_page_is_the_same(unwatched: str, opened: list[str],
     assert report["trajectory_sha256"] == unwatched
 
 
+@pytest.mark.long
 def test_a_station_vehicle_flies_the_same_beside_its_page(
     unwatched_hold: Array, opened: list[str], tmp_path: Path
 ) -> None:

@@ -34,6 +34,7 @@ def test_the_autopilot_knows_of_a_sagging_battery(sitl: Sitl) -> None:
     assert sitl.inside.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
 
 
+@pytest.mark.long
 def test_a_slow_solver_acts_late_and_skips_samples(sitl_fleet: Callable[..., list[Sitl]]) -> None:
     def flown(solve_ms: float, off_m: float = 0.1) -> Sitl:
         (sitl,) = sitl_fleet(1, airborne=5.0, system=1, params={"SIM_SOLVE_MS": solve_ms})

@@ -140,7 +140,8 @@ def test_a_landing_without_gyroscope_ends_upright(hovering: Hovering) -> None:
     assert sitl.tilt_deg < 5.0
 
 
-@pytest.mark.parametrize("delay_s", [0.2, *(pytest.param(delay_s, marks=pytest.mark.long) for delay_s in (0.1, 0.4))])
+@pytest.mark.long
+@pytest.mark.parametrize("delay_s", [0.1, 0.2, 0.4])
 @pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="5@90", seed=1, strict=False)
 def test_a_magnetometer_that_comes_late_is_not_followed(sitl: Sitl, delay_s: float) -> None:
     sitl.takeoff(5.0)
@@ -157,11 +158,9 @@ def test_a_magnetometer_that_comes_late_is_not_followed(sitl: Sitl, delay_s: flo
     assert not sitl.said("Impact")
 
 
+@pytest.mark.long
 @ON_SENSORS
-@pytest.mark.parametrize(
-    ("drift", "gps_first"),
-    [(17.0, True), *(pytest.param(drift, False, marks=pytest.mark.long) for drift in (17.0, -17.0, 5.0))],
-)
+@pytest.mark.parametrize(("drift", "gps_first"), [(17.0, True), (17.0, False), (-17.0, False), (5.0, False)])
 def test_a_barometer_that_drifts_does_not_keep_a_vehicle_without_gps_in_the_air(
     sitl: Sitl, drift: float, gps_first: bool
 ) -> None:
@@ -229,9 +228,10 @@ def test_slow_drifts_and_winds_end_in_landings(seed: int) -> None:
     assert not fly(case_of(seed)).violated
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("unit", "drift"),
-    [("mag", (0.03, 0.0, 0.0)), pytest.param("gyro", (0.003, 0.0, 0.0), marks=pytest.mark.long)],
+    [("mag", (0.03, 0.0, 0.0)), ("gyro", (0.003, 0.0, 0.0))],
     ids=["magnetometer", "gyroscope"],
 )
 @pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="7@200", strict=False)

@@ -58,6 +58,7 @@ def test_an_orbit_turns_both_ways_and_looks_as_told(
     assert turned_by(sitl, 0.5 * pi if look is None else atan2(y, x) + look) < 0.1
 
 
+@pytest.mark.long
 def test_an_orbit_commanded_again_goes_on_where_it_is(sitl: Sitl) -> None:
     """Its height is above sea level, though the frame says above home: so MAVSDK sends it, and PX4 reads it."""
     x, y = degrees_e7(sitl, 5.0, 0.0)

@@ -140,10 +140,11 @@ def from_curve_m(place: Vector) -> float:
     return float(np.linalg.norm(CURVE - np.array(place), axis=1).min())
 
 
-on_path = pytest.mark.sitl(profile="path", airborne=20.0, start={"psi": 45.0}, track=TOO_FAST)
+ON_PATH = pytest.mark.sitl(profile="path", airborne=20.0, start={"psi": 45.0}, track=TOO_FAST)
 
 
-@on_path
+@pytest.mark.long
+@ON_PATH
 def test_a_track_that_is_too_fast_is_flown_on_its_path(sitl: Sitl) -> None:
     pilot = sitl.inside.copter.pilot
     vehicle, reference = [], []
@@ -159,7 +160,8 @@ def test_a_track_that_is_too_fast_is_flown_on_its_path(sitl: Sitl) -> None:
     assert 0.3e6 < pilot.lag_us < 1.5e6
 
 
-@on_path
+@pytest.mark.long
+@ON_PATH
 def test_after_path_time_the_reference_keeps_the_speed(sitl: Sitl) -> None:
     sitl.run(1.2)
     pilot, loop = sitl.inside.copter.pilot, sitl.inside.copter.parts.loop
@@ -173,7 +175,8 @@ def test_after_path_time_the_reference_keeps_the_speed(sitl: Sitl) -> None:
     assert pilot.lag_us == before_us
 
 
-@on_path
+@pytest.mark.long
+@ON_PATH
 def test_a_restart_goes_on_at_the_same_path_time(sitl: Sitl) -> None:
     sitl.run(1.0)
     lag_us = sitl.inside.copter.pilot.lag_us

@@ -16,6 +16,7 @@ from tests.colibri.campaigns.engines import jobs
 PATIENCE_S = 120.0
 
 
+@pytest.mark.long
 def test_a_job_that_kills_its_worker_is_given_up() -> None:
     given = [0, 1, 2, jobs.KILLS, 3, 4, 5, 6]
     done = dict(Pool(2).each(jobs.doubled, 10, given))

@@ -64,6 +64,7 @@ def _is_smooth(flown: LoadedTrack) -> None:
             assert np.abs(np.diff(axis.derivative(order))).max() <= 0.001 * steepest * 1.2
 
 
+@pytest.mark.long
 def test_more_margin_is_slower_and_the_same_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 10)
     flown = [loaded(tmp_path, "x,y,z\n0,0,3\n4,0,3\n4,4,3\n", f",margin={margin}") for margin in (0.0, 0.3, 0.3)]
