@@ -11,7 +11,7 @@ from hypothesis import settings
 
 from colibri.common.process.lifecycle import freeze_once, use_one_thread
 
-settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("same-verdict", max_examples=50, deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
 
 gc.set_threshold(20_000, 20, 20)
