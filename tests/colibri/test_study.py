@@ -131,9 +131,8 @@ def test_a_table_has_rows_of_names_and_columns_of_groups(short: Flown) -> None:
     assert rows == [("a", "1", "ag", "1", "ah"), ("b", "1", "bg", "1", "bh")]
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "recovery" else pytest.mark.long) for name in NAMES]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", NAMES)
 def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path) -> None:
     study = of_name(name)
     flown = [moved(short, to_t_s=30.0, by_m=0.1)] * len(study.cases)

@@ -68,6 +68,7 @@ def checkout(tmp_path: Path) -> Path:
     return tmp_path / "checkout"
 
 
+@pytest.mark.long
 def test_outcomes_of_a_suite(checkout: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(checkout), "--out", str(tmp_path / "out")]) == 1
     written = (tmp_path / "out" / "table.md").read_text()

@@ -16,7 +16,6 @@ def test_a_seed_is_always_the_same_case() -> None:
 @pytest.mark.parametrize(
     ("event", "violated"),
     [
-        (RandomEvent(4.0, "goto", (5.0, 0.0, 3.0)), ""),
         (RandomEvent(3.0, "inject", ("motor", "off", 0.0)), ""),
         (RandomEvent(3.0, "disarm"), "ValueError at "),
     ],

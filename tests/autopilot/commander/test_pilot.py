@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.pilot import Sensed
@@ -186,7 +186,6 @@ ORDERS = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(ORDERS, max_size=12), st.booleans())
 def test_whatever_comes_the_pilot_stays_of_one_mind(orders: list[Mode | Action | str], flies: bool) -> None:
     cockpit = in_the_air() if flies else Cockpit()

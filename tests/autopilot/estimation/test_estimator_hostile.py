@@ -134,5 +134,5 @@ class HostileSensors(RuleBasedStateMachine):
         np.linalg.cholesky(0.5 * (P + P.T) / np.outer(sigma, sigma))
 
 
-HostileSensors.TestCase.settings = settings(max_examples=30, stateful_step_count=20, deadline=None)
+HostileSensors.TestCase.settings = settings(max_examples=30, stateful_step_count=20)
 TestHostileSensors = HostileSensors.TestCase

@@ -74,7 +74,7 @@ def within(limits: Limits, motions: Array, headings: Array) -> bool:
     return bool(max(shares) <= SLACK)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(LIMITS, PLACES, ANGLES)
 @example(Limits(2.0, 1.0, 1.0, 6.0, 1.0, 24.0, 1.0, 1.0), (0.0, 2.0, 0.0), 0.0)
 @example(Limits(2.0, 2.0, 3.0, 7.0, 3.0, 26.0, 4.0, 5.0), (-5.0, -4.0, 3.0), 0.0)
@@ -93,7 +93,7 @@ def test_rest_to_rest_keeps_limits_and_does_not_overshoot(limits: Limits, place:
     assert end.heading[1] == 0.0
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(LIMITS, st.tuples(reals(12.0), reals(12.0), reals(3.0)), reals(3.0))
 def test_a_velocity_is_reached_and_a_vehicle_stops_from_any(limits: Limits, velocity: Vector, rate: float) -> None:
     target = still_target(ORIGIN, 0.0, SAMPLES, (BindingDerivative.VELOCITY,) * 3)._replace(turns=False)
@@ -137,7 +137,7 @@ def test_a_plan_that_is_reached_is_the_reference(turns: int, since_s: float) -> 
     assert (target_of(plan).motion == target.motion).all()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(LIMITS, PLACES, PLACES)
 def test_a_target_that_jumps_is_followed_within_the_limits(limits: Limits, place: Vector, jumped: Vector) -> None:
     """The reference is on a target, to the last bit; the target jumps; the reference may not."""

@@ -70,6 +70,7 @@ def full_pipe() -> tuple[int, int]:
     return read, write
 
 
+@pytest.mark.long
 def test_an_unread_pipe_does_not_hold_up_a_flight(tmp_path: Path) -> None:
     free, called = bound_socket()
     free.close()
@@ -85,6 +86,7 @@ def test_an_unread_pipe_does_not_hold_up_a_flight(tmp_path: Path) -> None:
     os.close(write)
 
 
+@pytest.mark.long
 def test_a_fifo_in_a_files_place_is_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     fifo, profile = tmp_path / "fifo", tmp_path / "fifo.toml"
     os.mkfifo(fifo)

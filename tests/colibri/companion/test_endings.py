@@ -52,7 +52,9 @@ def flying() -> Ride[StandIn]:
     return ride
 
 
-@pytest.mark.parametrize(("options", "place"), [("", HERE), (":height=7", (12.0, -7.0, 7.0))])
+@pytest.mark.parametrize(
+    ("options", "place"), [("", HERE), pytest.param(":height=7", (12.0, -7.0, 7.0), marks=pytest.mark.long)]
+)
 def test_a_hover_stays_where_the_vehicle_is(options: str, place: tuple[float, ...]) -> None:
     stay = stay_of(f"hover{options}")
     ride = hovering(CompanionSettings(stay=stay, duration_s=2.0), f"hover{options}")
@@ -223,10 +225,10 @@ def test_another_sender_does_not_take_the_link() -> None:
 @pytest.mark.parametrize(
     ("message", "limit", "within_s"),
     [
-        ("HEARTBEAT", "stale reports", 6.2),
+        pytest.param("HEARTBEAT", "stale reports", 6.2, marks=pytest.mark.long),
         ("ESTIMATOR_STATUS", "stale reports", 3.5),
-        ("SYS_STATUS", "stale reports", 5.5),
-        ("TIMESYNC", "stale reports", 3.5),
+        pytest.param("SYS_STATUS", "stale reports", 5.5, marks=pytest.mark.long),
+        pytest.param("TIMESYNC", "stale reports", 3.5, marks=pytest.mark.long),
         ("ODOMETRY", "late states", 0.2),
     ],
 )

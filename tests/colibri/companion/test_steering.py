@@ -73,6 +73,7 @@ def test_a_fit_finds_the_lag_that_there_is() -> None:
     assert found.order == 1
 
 
+@pytest.mark.long
 def test_a_fit_finds_a_second_order_lag_and_delay() -> None:
     t, late, rows = np.arange(0.0, duration_s(), 0.008), 60, []
     commands, rate, turning = np.array([step_at(float(time_s)) for time_s in t]), np.zeros(3), np.zeros(3)

@@ -108,6 +108,7 @@ def test_without_memory_a_vehicle_on_sensors_is_caught(sitl: Sitl, flying_s: flo
     assert sitl.said("Restarted in flight without a record: falling")
 
 
+@pytest.mark.long
 @pytest.mark.feedback("sensors")
 def test_a_caught_vehicle_goes_on_with_its_mission(sitl: Sitl) -> None:
     sitl.takeoff(7.0)

@@ -66,6 +66,7 @@ def test_it_lands_without_an_accelerometer(sitl: Sitl, kind: str) -> None:
     assert sitl.said("Disarmed by landing")
 
 
+@pytest.mark.long
 @HIGH
 @pytest.mark.sitl(controller="geometric-se3")
 def test_any_control_law_may_have_flown_before(sitl: Sitl) -> None:

@@ -22,6 +22,7 @@ def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
             assert plant.wait() == 0
 
 
+@pytest.mark.long
 def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> None:
     first, url = start_plant(logs, tmp_path / "first")
     autopilot = start_autopilot(logs, url)

@@ -35,7 +35,9 @@ def flown_directly(name: str, profile: str = "thesis") -> tuple[dict[str, Any], 
         return figures, rows(Path(folder) / "flight.csv")
 
 
-@pytest.mark.parametrize("name", THESIS_TRACKS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "spiral" else pytest.mark.long) for name in THESIS_TRACKS]
+)
 def test_the_outer_loop_decides_as_the_thesis_says(name: str) -> None:
     """At each outer sample, [3.24-3.33] by hand from the flown state: thrust, and the references held for 0.4 s."""
     figures, flown = flown_directly(name)

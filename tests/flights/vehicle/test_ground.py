@@ -168,7 +168,11 @@ def test_the_battery_is_counted_across_flights(sitl: Sitl) -> None:
 
 @pytest.mark.parametrize(
     ("vehicle", "wind"),
-    [pytest.param("hummingbird", "2@0", marks=pytest.mark.long), ("hummingbird", "12@215"), ("iris", "12@37")],
+    [
+        pytest.param("hummingbird", "2@0", marks=pytest.mark.long),
+        ("hummingbird", "12@215"),
+        pytest.param("iris", "12@37", marks=pytest.mark.long),
+    ],
 )
 @pytest.mark.sitl(controller="geometric-se3", airborne=1.0, params={"COM_DISARM_LAND": 0.5})
 def test_geometric_law_lands_upright_in_wind(sitl_fleet: Callable[..., list[Sitl]], vehicle: str, wind: str) -> None:

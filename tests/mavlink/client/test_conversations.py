@@ -39,7 +39,7 @@ PARAMETERS = (
 )
 LOG = Random(1).randbytes(12_001)
 PATIENTLY = Repeat(500_000, 60)
-few = settings(max_examples=10, deadline=None)
+few = settings(max_examples=10)
 
 
 class TryingVehicle(Vehicle):

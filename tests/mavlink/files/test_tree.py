@@ -56,7 +56,7 @@ def outcome_of(operation: Callable[..., object], *arguments: object) -> object:
 
 
 @given(operations=OPERATIONS)
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_path_factory: object) -> None:
     path: Path = tmp_path_factory.mktemp("files")  # type: ignore[attr-defined]
     folder, memory = Folder(path, QUOTA), MemoryFiles(QUOTA)

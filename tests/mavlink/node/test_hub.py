@@ -1,7 +1,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
@@ -284,7 +284,6 @@ EVENTS = st.tuples(DATAGRAMS, st.integers(0, 2), st.none() | st.tuples(st.just("
                    st.integers(0, 10**10), st.booleans())  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None)
 @given(st.lists(EVENTS, max_size=12), st.sampled_from([None, bytes(range(32))]))
 def test_nothing_that_comes_raises(events: list[tuple[Any, ...]], key: bytes | None) -> None:
     observer = Observer()

@@ -73,7 +73,7 @@ def test_frames_share_the_messages() -> None:
     assert len(of_a_frame) > 0.7 * 2500
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1_000, 3_000_000), st.integers(1_000, 50_000), st.integers(0, 10**12))
 def test_intervals_do_not_drift(interval_us: int, frame_us: int, start_us: int) -> None:
     stream = flying()
@@ -239,7 +239,7 @@ def test_repeated_requests_do_not_delay_a_slow_stream() -> None:
     assert told == {"ATTITUDE": 10, "ATTITUDE_QUATERNION": 10}
 
 
-@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(
         st.tuples(st.sampled_from([SET, GET, REQUEST, 520]), MESSAGE_IDS, FLOATS, PEERS)

@@ -246,7 +246,7 @@ def test_unix_time_goes_on_from_the_start() -> None:
     assert fields.time_unix_usec == 1_800_000_012_345_678
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(ARBITRARY)
 def test_whatever_the_snapshot_holds_nothing_raises(snapshot: TelemetrySnapshot) -> None:
     for name in TELEMETRY:

@@ -84,7 +84,7 @@ NAMES = sorted(definition.msgname for definition in common.mavlink_map.values())
 WITH_TEXT = [name for name in NAMES if "char" in getattr(common, f"MAVLink_{name.lower()}_message").fieldtypes]
 
 
-@settings(max_examples=600)
+@settings(max_examples=200)
 @given(st.data(), st.sampled_from(NAMES) | st.sampled_from(WITH_TEXT))
 def test_reads_and_writes_as_pymavlink_does(data: st.DataObject, name: str) -> None:
     size = getattr(common, f"MAVLink_{name.lower()}_message").unpacker.size

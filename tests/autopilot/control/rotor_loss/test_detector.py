@@ -73,7 +73,7 @@ def test_a_lost_rotor_is_named_after_two_samples(rotor: int) -> None:
     assert flight.watch.lost == rotor
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(about_hover, starts, st.integers(0, 3))
 def test_it_is_named_in_any_attitude_and_at_any_rate(controls: PerRotor, start: Start, rotor: int) -> None:
     flight = Watched(controls, start)
@@ -82,7 +82,7 @@ def test_it_is_named_in_any_attitude_and_at_any_rate(controls: PerRotor, start: 
     assert flight.watch.lost == rotor
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(commands, starts, st.integers(0, 3), st.floats(0.6, 1.0))
 def test_a_weak_rotor_is_none_that_is_lost(controls: PerRotor, start: Start, rotor: int, part: float) -> None:
     flight = Watched(controls, start)
@@ -90,7 +90,7 @@ def test_a_weak_rotor_is_none_that_is_lost(controls: PerRotor, start: Start, rot
     assert flight.watch.max_evidence < 0.5 * ALARM
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.tuples(*[st.floats(-20.0, 20.0)] * 6), st.integers(1, 5))
 def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
     flight = Watched((0.6, 0.6, 0.6, 0.6))
@@ -116,7 +116,7 @@ def test_a_noisy_gyroscope_is_no_rotor(noise_rad_s: float) -> None:
     assert watch.lost is None
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(touchdowns, st.floats(0.4, 0.65))
 def test_ground_contact_is_no_lost_rotor(start: Start, speed: float) -> None:
     """The height is estimated too high, so the detection goes on after the touchdown."""

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, SNAP, PiecewisePolynomial, minimise
@@ -21,7 +21,6 @@ def legs() -> st.SearchStrategy[list[tuple[float, tuple[float, float]]]]:
     return st.lists(st.tuples(st.floats(0.05, 100.0), st.tuples(reals(100.0), reals(100.0))), min_size=1, max_size=12)
 
 
-@settings(max_examples=200, deadline=None)
 @given(legs(), st.sampled_from([SNAP, ACCELERATION]))
 def test_it_passes_every_point_in_time_and_rests_at_both_ends(
     path: list[tuple[float, tuple[float, float]]], order: int
