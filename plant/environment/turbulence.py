@@ -10,12 +10,13 @@ exact while these hold. Rotation of the air is left out: a quadrotor's span is s
 """
 
 from math import hypot, sqrt
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from colibri.common.jit import compiled
 from colibri.common.kernels import exp, expm1, power
-from colibri.common.types import Vector
+from colibri.common.types import Array, Vector
 from colibri.plant.environment.random_streams import RandomStream
 from colibri.plant.environment.weather import Intensity, RecordedWind, Weather, Wind
 
@@ -30,13 +31,13 @@ _BLOCK = 256
 _NOISES = 5
 
 
-class Eddies(NamedTuple):
-    """State of the filters along the mean wind (`u`), across it and upwards."""
+Lags: TypeAlias = tuple[float, float, float, float, float]
+"""State of the filters: one lag along the mean wind, two in series across it, two upwards."""
 
+
+class Eddies(NamedTuple):
     frame: int
-    u: float
-    v: tuple[float, float]
-    w: tuple[float, float]
+    lags: Lags
 
 
 class Scales(NamedTuple):
@@ -48,43 +49,16 @@ class Scales(NamedTuple):
     length_w_m: float
 
 
-def scales(intensity: Intensity, height_m: float) -> Scales:
+@compiled
+def scales(w20_knots: float, height_m: float) -> Scales:
     height_m = min(max(height_m, MIN_HEIGHT_M), MAX_HEIGHT_M)
     slope = 0.177 + 0.000823 * height_m * FEET_PER_M
-    sigma_w = 0.1 * W20_KNOTS[intensity] * KNOT_M_S
+    sigma_w = 0.1 * w20_knots * KNOT_M_S
     return Scales(sigma_w / power(slope, 0.4), sigma_w, height_m / power(slope, 1.2), height_m)
 
 
-def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
-    horizontal = scale.sigma_uv_m_s
-    return horizontal * eddies.u, horizontal * _across(eddies.v), scale.sigma_w_m_s * _across(eddies.w)
-
-
-class Turbulence:
-    def __init__(self, seed: int) -> None:
-        self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.WEATHER,)).generate_state(2, np.uint64)
-        self._block: tuple[int, list[list[float]]] = (-1, [])
-
-    def begin(self) -> Eddies:
-        u, v1, v2, w1, w2 = self._noise(0)
-        return Eddies(1, u, (v1, 0.5 * (v1 + v2)), (w1, 0.5 * (w1 + w2)))
-
-    def step(self, eddies: Eddies, scale: Scales, airspeed_m_s: float, duration_s: float) -> Eddies:
-        way_m = max(airspeed_m_s, MIN_AIRSPEED_M_S) * duration_s
-        n1, n2, n3, n4, n5 = self._noise(eddies.frame)
-        along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
-        u = exp(-along) * eddies.u + sqrt(-expm1(-2.0 * along)) * n1
-        return Eddies(eddies.frame + 1, u, _twice(eddies.v, along, n2, n3), _twice(eddies.w, up, n4, n5))
-
-    def _noise(self, frame: int) -> list[float]:
-        block, row = divmod(frame, _BLOCK)
-        if self._block[0] != block:
-            chance = np.random.Generator(np.random.Philox(key=self._key, counter=block << 128))
-            self._block = (block, chance.standard_normal((_BLOCK, _NOISES)).tolist())
-        return self._block[1][row]
-
-
-def _twice(x: tuple[float, float], way: float, n1: float, n2: float) -> tuple[float, float]:
+@compiled
+def _twice(x1: float, x2: float, way: float, n1: float, n2: float) -> tuple[float, float]:
     """Advance two equal lags in series, x1' = a (n - x1) and x2' = a (x1 - x2), by a t = `way`.
 
     The noise has the covariance P - Φ P Φᵀ, with P = [[1, 1/2], [1/2, 1/2]] and Φ = exp(-way) [[1, 0], [way, 1]].
@@ -97,12 +71,63 @@ def _twice(x: tuple[float, float], way: float, n1: float, n2: float) -> tuple[fl
     l11 = sqrt(q11)
     l21 = q12 / l11
     l22 = sqrt(max(0.0, q22 - l21 * l21))
-    return fade * x[0] + l11 * n1, fade * (way * x[0] + x[1]) + l21 * n1 + l22 * n2
+    return fade * x1 + l11 * n1, fade * (way * x1 + x2) + l21 * n1 + l22 * n2
 
 
-def _across(x: tuple[float, float]) -> float:
+@compiled
+def _across(x1: float, x2: float) -> float:
     """Return the output (1 + √3 s/a) / (1 + s/a)² of the two lags, scaled to variance 1."""
-    return (_SQRT_3 * x[0] + (1.0 - _SQRT_3) * x[1]) / sqrt(2.0)
+    return (_SQRT_3 * x1 + (1.0 - _SQRT_3) * x2) / sqrt(2.0)
+
+
+@compiled
+def step(lags: Lags, noise: Array, scale: Scales, airspeed_m_s: float, duration_s: float) -> Lags:
+    """Return the lags after a frame with a row of `Turbulence.noise`."""
+    u, v1, v2, w1, w2 = lags
+    way_m = max(airspeed_m_s, MIN_AIRSPEED_M_S) * duration_s
+    along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
+    u = exp(-along) * u + sqrt(-expm1(-2.0 * along)) * noise[0]
+    v1, v2 = _twice(v1, v2, along, noise[1], noise[2])
+    w1, w2 = _twice(w1, w2, up, noise[3], noise[4])
+    return u, v1, v2, w1, w2
+
+
+@compiled
+def add_eddies(velocity: Vector, lags: Lags, scale: Scales, east: float, north: float) -> Vector:
+    """Add the velocity of the eddies to another, ENU; `east` and `north`: direction of the mean wind."""
+    u, v1, v2, w1, w2 = lags
+    along, left, up = scale.sigma_uv_m_s * u, scale.sigma_uv_m_s * _across(v1, v2), scale.sigma_w_m_s * _across(w1, w2)
+    x, y, z = velocity
+    return x + east * along - north * left, y + north * along + east * left, z + up
+
+
+@compiled
+def _go_on(
+    lags: Lags, noise: Array, w20_knots: float, height_m: float, airspeed_m_s: float, duration_s: float,
+    velocity: Vector, east: float, north: float,
+) -> tuple[Vector, Lags]:  # fmt: skip
+    scale = scales(w20_knots, height_m)
+    lags = step(lags, noise, scale, airspeed_m_s, duration_s)
+    return add_eddies(velocity, lags, scale, east, north), lags
+
+
+class Turbulence:
+    """The noise of each frame."""
+
+    def __init__(self, seed: int) -> None:
+        self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.WEATHER,)).generate_state(2, np.uint64)
+        self._block: tuple[int, list[Array]] = (-1, [])
+
+    def begin(self) -> Eddies:
+        u, v1, v2, w1, w2 = self.noise(0).tolist()
+        return Eddies(1, (u, v1, 0.5 * (v1 + v2), w1, 0.5 * (w1 + w2)))
+
+    def noise(self, frame: int) -> Array:
+        block, row = divmod(frame, _BLOCK)
+        if self._block[0] != block:
+            chance = np.random.Generator(np.random.Philox(key=self._key, counter=block << 128))
+            self._block = (block, [*chance.standard_normal((_BLOCK, _NOISES))])
+        return self._block[1][row]
 
 
 CALM: Vector = (0.0, 0.0, 0.0)
@@ -127,7 +152,8 @@ class Air:
         if self._intensity is None:
             return self._with_gusts(wind, 0.0), None
         eddies = self._turbulence.begin()
-        return _with_eddies(self._with_gusts(wind, 0.0), wind, eddies, scales(self._intensity, height_m)), eddies
+        scale = scales(W20_KNOTS[self._intensity], height_m)
+        return add_eddies(self._with_gusts(wind, 0.0), eddies.lags, scale, *_direction(wind)), eddies
 
     def go_on(
         self, eddies: Eddies | None, time_us: int, height_m: float, velocity_enu_m_s: Vector, duration_us: int
@@ -138,11 +164,11 @@ class Air:
         moving = self._with_gusts(wind, time_s)
         if self._intensity is None or eddies is None:
             return moving, None
-        scale = scales(self._intensity, height_m)
         x, y, z = velocity_enu_m_s
-        airspeed = hypot(x - wind[0], y - wind[1], z - wind[2])
-        eddies = self._turbulence.step(eddies, scale, airspeed, duration_us * 1e-6)
-        return _with_eddies(moving, wind, eddies, scale), eddies
+        airspeed, noise = hypot(x - wind[0], y - wind[1], z - wind[2]), self._turbulence.noise(eddies.frame)
+        w20_knots, duration_s, (east, north) = W20_KNOTS[self._intensity], duration_us * 1e-6, _direction(wind)
+        blows, lags = _go_on(eddies.lags, noise, w20_knots, height_m, airspeed, duration_s, moving, east, north)
+        return blows, Eddies(eddies.frame + 1, lags)
 
     def _mean_at(self, time_s: float) -> Vector:
         return self._mean or self._wind.velocity_at(time_s)
@@ -154,8 +180,6 @@ class Air:
         return velocity
 
 
-def _with_eddies(velocity: Vector, wind: Vector, eddies: Eddies, scale: Scales) -> Vector:
-    along, left, up = eddy_velocity(eddies, scale)
+def _direction(wind: Vector) -> tuple[float, float]:
     speed = hypot(wind[0], wind[1])
-    e, n = (wind[0] / speed, wind[1] / speed) if speed > 0.0 else (1.0, 0.0)
-    return (velocity[0] + e * along - n * left, velocity[1] + n * along + e * left, velocity[2] + up)
+    return (wind[0] / speed, wind[1] / speed) if speed > 0.0 else (1.0, 0.0)

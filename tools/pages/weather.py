@@ -10,7 +10,7 @@ from scipy.signal import welch
 
 from colibri.analysis.figures import GRID, put_head, write_figure
 from colibri.common.types import Array
-from colibri.plant.environment.turbulence import CALM, Air, scales
+from colibri.plant.environment.turbulence import CALM, W20_KNOTS, Air, scales
 from colibri.plant.environment.weather import INTENSITIES, Gust, Intensity, Weather, Wind
 
 _WIND = Wind(8.0, 270.0)
@@ -72,7 +72,7 @@ def _spectra(axes: Axes, axis: int, name: str) -> None:
 
 
 def _dryden(intensity: Intensity, axis: int, hz: Array) -> Array:
-    scale = scales(intensity, _HEIGHT_M)
+    scale = scales(W20_KNOTS[intensity], _HEIGHT_M)
     sigma, length_m = (scale.sigma_w_m_s, scale.length_w_m) if axis == 2 else (scale.sigma_uv_m_s, scale.length_uv_m)
     squared = (2.0 * pi * hz * length_m / _WIND.speed_m_s) ** 2
     shape = (1.0 + 3.0 * squared) / (1.0 + squared) ** 2 if axis == 2 else 2.0 / (1.0 + squared)

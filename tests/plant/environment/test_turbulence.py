@@ -9,24 +9,24 @@ import pytest
 from scipy.signal import welch
 
 from colibri.common.types import Array
-from colibri.plant.environment.turbulence import Air, Turbulence, eddy_velocity, scales
+from colibri.plant.environment.turbulence import W20_KNOTS, Air, Turbulence, add_eddies, scales, step
 from colibri.plant.environment.weather import Intensity, Weather
 from colibri.plant.texts import wind
 
 FOOT = 0.3048
 KNOT = 1852.0 / 3600.0
 AIRSPEED_M_S, HEIGHT_M = 10.0, 30.0
-SCALE = scales("moderate", HEIGHT_M)
+SCALE = scales(W20_KNOTS["moderate"], HEIGHT_M)
 
 
 @cache
 def blow(steps: int, step_s: float, seed: int = 1) -> Array:
     turbulence = Turbulence(seed)
-    eddies = turbulence.begin()
+    begun, lags = turbulence.begin()
     velocities = []
-    for _ in range(steps):
-        velocities.append(eddy_velocity(eddies, SCALE))
-        eddies = turbulence.step(eddies, SCALE, AIRSPEED_M_S, step_s)
+    for frame in range(begun, begun + steps):
+        velocities.append(add_eddies((0.0, 0.0, 0.0), lags, SCALE, 1.0, 0.0))
+        lags = step(lags, turbulence.noise(frame), SCALE, AIRSPEED_M_S, step_s)
     return np.array(velocities)
 
 
@@ -43,16 +43,17 @@ def across(omega: Array, sigma: float, length_m: float) -> Array:
 
 @pytest.mark.parametrize(("intensity", "knots"), [("light", 15.0), ("moderate", 30.0), ("severe", 45.0)])
 def test_the_scales_are_those_of_the_specification(intensity: Intensity, knots: float) -> None:
+    assert W20_KNOTS[intensity] == knots
     vertical = 0.1 * knots * KNOT
-    assert scales(intensity, 1000.0 * FOOT) == pytest.approx((vertical, vertical, 1000.0 * FOOT, 1000.0 * FOOT))
+    assert scales(knots, 1000.0 * FOOT) == pytest.approx((vertical, vertical, 1000.0 * FOOT, 1000.0 * FOOT))
     slope = 0.177 + 0.000823 * 100.0
     low = (vertical / slope**0.4, vertical, 100.0 * FOOT / slope**1.2, 100.0 * FOOT)
-    assert scales(intensity, 100.0 * FOOT) == pytest.approx(low)
+    assert scales(knots, 100.0 * FOOT) == pytest.approx(low)
 
 
 @pytest.mark.parametrize(("height_ft", "as_ft"), [(9.0, 10.0), (-5.0, 10.0), (1500.0, 1000.0)])
 def test_below_ten_and_above_a_thousand_feet_it_is_as_there(height_ft: float, as_ft: float) -> None:
-    assert scales("light", height_ft * FOOT) == pytest.approx(scales("light", as_ft * FOOT))
+    assert scales(15.0, height_ft * FOOT) == pytest.approx(scales(15.0, as_ft * FOOT))
 
 
 @pytest.mark.parametrize(("axis", "formula"), [(0, along), (1, across), (2, across)])
