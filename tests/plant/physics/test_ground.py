@@ -22,7 +22,7 @@ VEHICLE = load_vehicle("hummingbird")
 TOUCHED_M = 1e-4
 
 
-@pytest.mark.parametrize("integrator", ["rk4", "adaptive"])
+@pytest.mark.parametrize("integrator", ["rk4", pytest.param("adaptive", marks=pytest.mark.long)])
 def test_it_rests_where_it_stands(integrator: Integrator) -> None:
     rest = states(flight(VEHICLE, Start(x=1.0, psi=30.0), OFF, 5.0, integrator=integrator))
     assert rest[-1] == pytest.approx(rest[0], abs=1e-9)
