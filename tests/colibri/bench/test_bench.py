@@ -14,7 +14,6 @@ from colibri.bench import costs, run, speed, stages
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
-SHORTEST = min(stages.BLOCKS)
 
 
 def figures_of(out: Path, *options: str) -> dict[str, Any]:
@@ -23,19 +22,25 @@ def figures_of(out: Path, *options: str) -> dict[str, Any]:
     return figures
 
 
+@pytest.fixture(
+    scope="module", params=[[stages.PROFILE_HORIZON], pytest.param([*stages.BLOCKS], marks=pytest.mark.long)]
+)
+def chosen(request: pytest.FixtureRequest) -> list[int]:
+    """Horizons; each has kernels of its own."""
+    return list(request.param)
+
+
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Return what is measured at horizons that profiles have: another's kernels would be compiled for this alone."""
-    profiles = {horizon: blocks for horizon, blocks in stages.BLOCKS.items() if horizon != SHORTEST}
+def measured(chosen: list[int], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "BLOCKS", profiles)
+        patch.setattr(stages, "BLOCKS", {horizon: stages.BLOCKS[horizon] for horizon in chosen})
         return figures_of(tmp_path_factory.mktemp("bench") / "stages.json", "--only", "stages")
 
 
-def test_every_stage_takes_time_at_every_horizon(measured: dict[str, Any]) -> None:
+def test_every_stage_takes_time_at_every_horizon(chosen: list[int], measured: dict[str, Any]) -> None:
     assert set(measured) == {"settings", "stages"}
     horizons = measured["stages"]["horizons"]
-    assert {int(horizon) for horizon in horizons} == set(stages.BLOCKS) - {SHORTEST}
+    assert [int(horizon) for horizon in horizons] == chosen
     for horizon, figures in horizons.items():
         assert sum(figures["blocks"]) == int(horizon)
         assert set(figures["us"]) == {stage.name for stage in stages.STAGES}
