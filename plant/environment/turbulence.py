@@ -140,6 +140,8 @@ class Air:
         self._turbulence = Turbulence(weather.seed)
         self.steady: Vector | None = None  # velocity, ENU, m/s, where it is constant
         self.blow(weather.wind)
+        if self._intensity is not None:  # load compiled code before the first frame
+            self.go_on(self._turbulence.begin(), 0, 0.0, CALM, 1)
 
     def blow(self, wind: Wind | RecordedWind) -> None:
         """Replace the mean wind; gusts and turbulence stay."""

@@ -10,7 +10,7 @@ from math import nan
 
 from numba.core.dispatcher import Dispatcher
 
-from colibri import autopilot
+from colibri import autopilot, plant
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.backends.setting import setting_of
@@ -21,8 +21,8 @@ from tests.support.flying import ACCEPTED
 
 def versions() -> dict[str, int]:
     """Return of each kernel how many versions are loaded."""
-    entries = pkgutil.walk_packages(autopilot.__path__, "colibri.autopilot.")
-    names = [entry.name for entry in entries if not entry.name.endswith("__main__")]
+    folders = (pkgutil.walk_packages(each.__path__, f"{each.__name__}.") for each in (autopilot, plant))
+    names = [entry.name for entries in folders for entry in entries if not entry.name.endswith("__main__")]
     found = [kernel for name in names for kernel in vars(importlib.import_module(name)).values()]
     return {str(kernel): len(kernel.signatures) for kernel in found if isinstance(kernel, Dispatcher)}
 
@@ -57,7 +57,7 @@ def fly(flight: Sitl) -> None:
 
 def main() -> None:
     with Flights(setting_of([]), None) as flights:
-        flight = flights.begin()
+        flight = flights.begin(turbulence="light", ready=False)
         before = versions()
         fly(flight)
     for name, count in versions().items():
