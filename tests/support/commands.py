@@ -1,5 +1,6 @@
 """The command line, run in this process, and files to hand to it."""
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -32,7 +33,12 @@ def edited(folder: Path, source: Path, old: str, new: str) -> str:
 
 
 def exit_code(command: list[str]) -> int | str | None:
+    """Run a command; signals are then handled as before, in this process and those that it starts."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         return main(command)
     except SystemExit as ended:
         return ended.code
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

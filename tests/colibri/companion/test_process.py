@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.commands import Refused, exit_code
+from tests.support.commands import Refused
 from tools.harness.processes import vehicle
 
 LINK = "udpin:127.0.0.1:0"
@@ -30,18 +30,16 @@ def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProces
 
 
 @pytest.mark.long
-def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
     with vehicle(tmp_path) as flown:
         options = ["--dry-run", "--duration", "1", "--min-pace", "1", "--max-age", "20000", "--max-gap", "20000"]
-        to = ("--vehicle", f"udpout:127.0.0.1:{flown.port}")
-        assert not exit_code(["companion", str(mission), *options, *to, "--out", str(tmp_path / "out")])
+        ended = companion(tmp_path / "out", flown.port, str(mission), *options)
+        assert ended.returncode == 0, ended.stderr
         assert not any(sight.armed for sight in flown.seen.sights)
-        capfd.readouterr()
-        hover = ("companion", "hover", "--dry-run", "--wait", "0.3", "--out", str(tmp_path / "late"))
-        assert exit_code([*hover, *to]) == 1
-        assert "timed out" in capfd.readouterr().err
+        late = companion(tmp_path / "late", flown.port, "hover", "--dry-run", "--wait", "0.3")
+        assert (late.returncode, "timed out" in late.stderr) == (1, True)
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert (report["stack"], report["setpoints"], report["in_order"]) == ("colibri", 0, True)
     rows = list(csv.DictReader((tmp_path / "out" / "companion.csv").read_text(encoding="utf-8").splitlines()))

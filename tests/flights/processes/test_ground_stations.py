@@ -13,7 +13,7 @@ from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
 from tools.soak.clients import ACCEPTED, HarnessStation
 
-DURATION = ("--duration", "2")
+DURATION = ("--duration", "4")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
 
 
