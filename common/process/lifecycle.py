@@ -89,12 +89,12 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
 _PARENT_EVERY = 8  # checks between two looks at the parent; a process checks every frame, or ten times a second
 _LAST_S = 5  # a process whose parent has died is killed after this time, wherever it hangs
 _PR_SET_PDEATHSIG = 1
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def handle_endings(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
     """Handle Ctrl-C, `kill` and a closed terminal, unless under `nohup`."""
-    for number in _ENDING:
+    for number in ENDINGS:
         if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 

@@ -112,7 +112,7 @@ def _go_on(
 
 
 class Turbulence:
-    """The noise of each frame."""
+    """Random numbers of one seed, by frame."""
 
     def __init__(self, seed: int) -> None:
         self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.WEATHER,)).generate_state(2, np.uint64)
@@ -123,6 +123,7 @@ class Turbulence:
         return Eddies(1, (u, v1, 0.5 * (v1 + v2), w1, 0.5 * (w1 + w2)))
 
     def noise(self, frame: int) -> Array:
+        """Return five standard normal numbers: one for each lag."""
         block, row = divmod(frame, _BLOCK)
         if self._block[0] != block:
             chance = np.random.Generator(np.random.Philox(key=self._key, counter=block << 128))
@@ -136,25 +137,25 @@ CALM: Vector = (0.0, 0.0, 0.0)
 class Air:
     def __init__(self, weather: Weather) -> None:
         self._gusts = weather.gusts
-        self._intensity = weather.turbulence
+        self._w20_knots = None if weather.turbulence is None else W20_KNOTS[weather.turbulence]
         self._turbulence = Turbulence(weather.seed)
         self.steady: Vector | None = None  # velocity, ENU, m/s, where it is constant
         self.blow(weather.wind)
-        if self._intensity is not None:  # load compiled code before the first frame
+        if self._w20_knots is not None:  # load compiled code before the first frame
             self.go_on(self._turbulence.begin(), 0, 0.0, CALM, 1)
 
     def blow(self, wind: Wind | RecordedWind) -> None:
         """Replace the mean wind; gusts and turbulence stay."""
         self._wind = wind
         self._mean = wind.velocity_at(0.0) if wind.constant else None
-        self.steady = None if self._gusts or self._intensity else self._mean
+        self.steady = None if self._gusts or self._w20_knots else self._mean
 
     def begin(self, height_m: float) -> tuple[Vector, Eddies | None]:
         wind = self._mean_at(0.0)
-        if self._intensity is None:
+        if self._w20_knots is None:
             return self._with_gusts(wind, 0.0), None
         eddies = self._turbulence.begin()
-        scale = scales(W20_KNOTS[self._intensity], height_m)
+        scale = scales(self._w20_knots, height_m)
         return add_eddies(self._with_gusts(wind, 0.0), eddies.lags, scale, *_direction(wind)), eddies
 
     def go_on(
@@ -164,13 +165,13 @@ class Air:
         time_s = time_us * 1e-6
         wind = self._mean_at(time_s)
         moving = self._with_gusts(wind, time_s)
-        if self._intensity is None or eddies is None:
+        if self._w20_knots is None or eddies is None:
             return moving, None
         x, y, z = velocity_enu_m_s
         airspeed, noise = hypot(x - wind[0], y - wind[1], z - wind[2]), self._turbulence.noise(eddies.frame)
-        w20_knots, duration_s, (east, north) = W20_KNOTS[self._intensity], duration_us * 1e-6, _direction(wind)
-        blows, lags = _go_on(eddies.lags, noise, w20_knots, height_m, airspeed, duration_s, moving, east, north)
-        return blows, Eddies(eddies.frame + 1, lags)
+        duration_s, (east, north) = duration_us * 1e-6, _direction(wind)
+        air, lags = _go_on(eddies.lags, noise, self._w20_knots, height_m, airspeed, duration_s, moving, east, north)
+        return air, Eddies(eddies.frame + 1, lags)
 
     def _mean_at(self, time_s: float) -> Vector:
         return self._mean or self._wind.velocity_at(time_s)
@@ -183,5 +184,6 @@ class Air:
 
 
 def _direction(wind: Vector) -> tuple[float, float]:
+    """Return the direction, east and north; without wind, east."""
     speed = hypot(wind[0], wind[1])
     return (wind[0] / speed, wind[1] / speed) if speed > 0.0 else (1.0, 0.0)

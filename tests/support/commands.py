@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from colibri.cli.main import main
+from colibri.common.process.lifecycle import ENDINGS
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
@@ -33,8 +34,8 @@ def edited(folder: Path, source: Path, old: str, new: str) -> str:
 
 
 def exit_code(command: list[str]) -> int | str | None:
-    """Run a command; signals are then handled as before, in this process and those that it starts."""
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    """Run a command, and restore the handlers of signals: later child processes would inherit ignored ones."""
+    handlers = {number: signal.getsignal(number) for number in ENDINGS}
     try:
         return main(command)
     except SystemExit as ended:
