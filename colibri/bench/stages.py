@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.autopilot.control.lpv_mpc import planning
-from colibri.autopilot.control.lpv_mpc.mpc import Mpc
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Qps
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
@@ -47,8 +47,7 @@ class Stage(NamedTuple):
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
     Stage("observe, references, condense", planning, "begin_by_clock"),
-    Stage("QP", Mpc, "solve"),
-    Stage("read plan", planning, "read"),
+    Stage("QP and plan", Mpc, "plan"),
     Stage("mixer", rotor_lag, "actuate"),
     CONTROL_STEP,
 )
@@ -73,10 +72,10 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageT
     every = max(1, round(duration_s / float(profile.table(CONTROLLER)["control_interval_s"]) / _QPS))
     seen, flying = 0, False
 
-    def keep_qp(_result: Any, _kind: Any, qp: Qp, *_: Any) -> None:
+    def keep_qp(_result: Any, qps: Qps, *_: Any) -> None:
         nonlocal seen
         if seen % every == 0:
-            flight.qps.append(deepcopy(qp))
+            flight.qps.append(deepcopy(qps.free))
         seen += 1
 
     def begun(_sim_time_s: float) -> None:
@@ -84,7 +83,7 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageT
         flying = True
 
     keepers: dict[str, Callable[..., object]] = {
-        "QP": keep_qp,
+        "QP and plan": keep_qp,
         FRAME_RECEIVED.name: lambda _result, datagram, *_: flight.frames.append(datagram),
         COMMAND_RECEIVED.name: lambda _result, datagram, *_: flight.commands.append(datagram),
     }

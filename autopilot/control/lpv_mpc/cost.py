@@ -23,6 +23,8 @@ from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
 
+_VECTOR = 8  # numbers in the longest vectors of today's CPUs
+
 
 class CostWeights(NamedTuple):
     """Weights of errors and corrections."""
@@ -104,6 +106,12 @@ def _blocks(starts: Integers, step: int) -> int:
 
 
 @inlined
+def _reach(k: int, columns: int) -> int:
+    """Return how far row k of the symmetric H is computed: to its diagonal, in whole vectors of columns."""
+    return min((k // _VECTOR + 1) * _VECTOR, columns)
+
+
+@inlined
 def _add_motion(
     motion: Array,
     responses: Array,
@@ -131,7 +139,7 @@ def _add_motion(
     heading = cos_pitch * nearest_angle(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
     if not problem.upright:
         on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
-    for k in range(used):
+    for k in range(X.shape[1]):
         row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
     for k in range(used):
         P0, P1, P2 = on_place * X[POSITION, k], on_place * X[POSITION + 1, k], on_place * X[POSITION + 2, k]
@@ -141,7 +149,7 @@ def _add_motion(
         first = f[k] + p0 * P0 + v0 * V0 + w0 * W0
         second = first + p1 * P1 + v1 * V1 + w1 * W1
         f[k] = second + p2 * P2 + v2 * V2 + w2 * W2 + heading * turned
-        for i in range(k + 1):
+        for i in range(_reach(k, X.shape[1])):
             first = H[k, i] + P0 * X[POSITION, i] + V0 * X[VELOCITY, i] + W0 * X[RATE, i]
             second = first + P1 * X[POSITION + 1, i] + V1 * X[VELOCITY + 1, i] + W1 * X[RATE + 1, i]
             third = second + P2 * X[POSITION + 2, i] + V2 * X[VELOCITY + 2, i] + W2 * X[RATE + 2, i]
@@ -237,7 +245,7 @@ def _add_terminal(
         for k in range(moved):
             s, t, u, v = E[i, k], E[i + 1, k], E[i + 2, k], E[i + 3, k]
             f[k] = f[k] + s * weighted[i] + t * weighted[i + 1] + u * weighted[i + 2] + v * weighted[i + 3]
-            for j in range(k + 1):
+            for j in range(_reach(k, moved)):
                 H[k, j] = H[k, j] + s * W[i, j] + t * W[i + 1, j] + u * W[i + 2, j] + v * W[i + 3, j]
 
 

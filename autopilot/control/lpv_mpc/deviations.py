@@ -144,8 +144,7 @@ def respond(
         blocks = means.shape[0]
         while means[blocks - 1, step] == 0.0:  # not begun; without lag, those before have ended, too
             blocks -= 1
-        used = inputs * blocks
-        _advance(responses, step, T, model.interval_s, used)
+        _advance(responses, step, T, model.interval_s)
         X = responses[step + 1]
         for block in range(blocks):
             mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
@@ -157,11 +156,10 @@ def respond(
                     X[ROTATION + i, column] += T.turn[i, rotor, step] * mean
                     X[RATE + i, column] += T.moment[i, rotor, step] * mean
                 X[RATE + 2, column] += T.spin[rotor, step] * change
-        X[:, used:] = 0.0
 
 
 @inlined
-def _advance(X: Array, n: int, T: StepTransition, h: float, used: int) -> None:
+def _advance(X: Array, n: int, T: StepTransition, h: float) -> None:
     for i in range(3):
         pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
         pw0, pw1, pw2 = T.position_rate[i, 0, n], T.position_rate[i, 1, n], T.position_rate[i, 2, n]
@@ -171,7 +169,7 @@ def _advance(X: Array, n: int, T: StepTransition, h: float, used: int) -> None:
         rr0, rr1, rr2 = T.rotation[i, 0, n], T.rotation[i, 1, n], T.rotation[i, 2, n]
         rw0, rw1, rw2 = T.rotation_rate[i, 0, n], T.rotation_rate[i, 1, n], T.rotation_rate[i, 2, n]
         ww0, ww1, ww2 = T.rate[i, 0, n], T.rate[i, 1, n], T.rate[i, 2, n]
-        for c in range(used):
+        for c in range(X.shape[2]):  # also those not begun: a constant number is vectorised whole
             v0, v1, v2 = X[n, VELOCITY, c], X[n, VELOCITY + 1, c], X[n, VELOCITY + 2, c]
             r0, r1, r2 = X[n, ROTATION, c], X[n, ROTATION + 1, c], X[n, ROTATION + 2, c]
             w0, w1, w2 = X[n, RATE, c], X[n, RATE + 1, c], X[n, RATE + 2, c]
@@ -195,7 +193,7 @@ def _hover(thrust_n: float, packed: Packed, T: StepTransition, X: Array) -> None
     squared[:] = thrust_n / total
     _linearise(level, squared, model, T)
     X[0] = np.eye(DEVIATIONS)
-    _advance(X, 0, T, model.interval_s, DEVIATIONS)
+    _advance(X, 0, T, model.interval_s)
 
 
 def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:

@@ -183,14 +183,20 @@ class Mpc:
         self, qps: Qps, psi: float, path: PathNow | None, mass_kg: float, path_lag_s: float
     ) -> tuple[Plan | None, Diagnostics]:
         """Solve the QP and read its plan, None if it is not solved; `psi` is unwrapped."""
+        commands, states = np.empty(self._commands), np.empty(self._states)
         started_s = self._clock()
-        status, z, iterations, slack, (tilts, rates) = self.solve(*qps)
+        z: Array | None = qps.minimum
+        is_free, is_beyond, bounds = planning.plan(qps.kind, qps.minimum, False, psi, commands, states)
+        status, iterations, slack, tilts, rates = QpStatus.SOLVED, 0.0, 0.0, 0, 0
+        if is_beyond or not is_free:
+            status, z, iterations, slack, (tilts, rates) = self._solve(*qps, is_free=is_free)
+            if z is not None:
+                _, _, bounds = planning.plan(qps.kind, z, True, psi, commands, states)
         solve_time_s = self._clock() - started_s
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
-        commands, states = np.empty(self._commands), np.empty(self._states)
-        active = Active(planning.read(qps.kind, z, psi, commands, states), 0, tilts, rates)
+        active = Active(bounds, 0, tilts, rates)
         diagnostics = Diagnostics(
             status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
         )
@@ -204,16 +210,13 @@ class Mpc:
         planning.is_beyond(self.on_clock.kind, z)
         planning.count_active(self.on_clock.kind, z)
 
-    def solve(self, kind: Packed, free: Qp, limited: Qp, minimum: Array) -> Corrections:
-        """Return the optimal changes of the corrections.
+    def _solve(self, kind: Packed, free: Qp, limited: Qp, minimum: Array, *, is_free: bool) -> Corrections:
+        """Return the optimal changes of the corrections, where the unconstrained `minimum` is beyond a limit.
 
-        An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again.
+        If it `is_free`, it is within the rotor limits; a plan beyond a soft limit is solved again.
         """
-        is_free, is_beyond = planning.minimise(kind, minimum)
-        if is_free and not is_beyond:
-            return QpStatus.SOLVED, minimum, 0, 0.0, (0, 0)
         status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
-        if z is None or not (is_beyond or planning.is_beyond(kind, z)):
+        if z is None or not (is_free or planning.is_beyond(kind, z)):
             return status, z, iterations, 0.0, (0, 0)
         planning.limit(kind)
         status, z, more = self._solver.solve(limited)

@@ -222,15 +222,6 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 
 @compiled
-def minimise(kind: Packed, z: Array) -> tuple[bool, bool]:
-    """Write the unconstrained minimum; return whether it is within the rotor limits, and beyond a soft limit."""
-    problem = kind[0].problem
-    if not free_minimum(kind[0].qp, problem.starts.shape[0] - 1, len(problem.allocation), z):
-        return False, False
-    return True, exceeds(kind[0].work.motion, kind[0].work.responses, z, problem)
-
-
-@compiled
 def free_minimum(qp: Qp, blocks: int, rotors: int, z: Array) -> bool:
     """Write the unconstrained minimum by Cholesky factors; return whether it is within bounds.
 
@@ -285,9 +276,25 @@ def is_beyond(kind: Packed, z: Array) -> bool:
 
 
 @compiled
-def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> int:
-    """Write commands and states of the plan by z, from yaw `psi`; return its active bounds."""
-    starts, work, qp = kind[0].problem.starts, kind[0].work, kind[0].qp
+def plan(kind: Packed, z: Array, solved: bool, psi: float, commands: Array, states: Array) -> tuple[bool, bool, int]:
+    """Write commands and states of the plan by a solution z, from yaw `psi`.
+
+    Unless `solved`, z becomes the unconstrained minimum; without one within all limits, there is no plan. Return
+    whether z is within the rotor limits, whether beyond a soft limit, and the plan's active bounds.
+    """
+    if not solved:
+        problem = kind[0].problem
+        if not free_minimum(kind[0].qp, problem.starts.shape[0] - 1, len(problem.allocation), z):
+            return False, False, 0
+        if exceeds(kind[0].work.motion, kind[0].work.responses, z, problem):
+            return True, True, 0
+    return True, False, _read(kind[0], z, psi, commands, states)
+
+
+@inlined
+def _read(kind: QpKind, z: Array, psi: float, commands: Array, states: Array) -> int:
+    """Write the plan by z; return its active bounds."""
+    starts, work, qp = kind.problem.starts, kind.work, kind.qp
     corrections = work.corrections[1:].copy()
     inputs = z.shape[0] // corrections.shape[0]
     binding = 0
