@@ -1,6 +1,7 @@
 """`provenance.json`: all inputs of a flight by content, as their files may change."""
 
 from dataclasses import replace
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -23,6 +24,7 @@ from colibri.flights.spec import FlightSpec
 from colibri.plant.environment.weather import RecordedWind
 from colibri.plant.vehicle.description import Vehicle
 
+_version = cache(version)  # it reads a file of the package
 _NOT_KEPT = ("out", "tlog", "gcs", "signing_key", "insecure", "speed")  # options without effect on the flight
 _NAMES = ("track", "profile", "controller", "solver", "delay", "vehicle", "plant_vehicle", "without")
 """Options that are recorded by the contents they name."""
@@ -63,7 +65,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
         "options": options,
         "track": with_file(str(plan.spec.track), Path()),
     }
-    colibri = version("colibri-sitl")
+    colibri = _version("colibri-sitl")
     hashes = {name: hash_of(content) for name, content in (contents | nameless).items() if content is not None}
     return Provenance(colibri=colibri, spec=values, sha256={**hashes, "all": hash_of([colibri, hashes])}, **contents)
 

@@ -1,5 +1,6 @@
 """Tracks tabulated at equal intervals."""
 
+from functools import lru_cache
 from math import hypot, inf
 
 import numpy as np
@@ -51,11 +52,21 @@ class Planner:
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        first, lead = block * self._length, min(block, 1)
-        samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
-        interval_s = self.preview.interval_us * 1e-6
-        by = _by_differences if self._references == "by-differences" else _by_formula
-        return Horizon(*(column[lead:] for column in by(self._track, interval_s * samples, interval_s)))
+        tabulated = _whole if self._rest is not None else _blocks
+        table = tabulated(self._track, self._references, self.preview, self._length, block)
+        return Horizon(*(column.copy() for column in table))  # what a law writes there stays in its flight
+
+
+def _tabulated(track: Track, references: References, preview: Preview, length: int, block: int) -> Horizon:
+    first, lead = block * length, min(block, 1)
+    samples = np.arange(first - lead, first + length + preview.samples, dtype=np.float64)
+    interval_s = preview.interval_us * 1e-6
+    by = _by_differences if references == "by-differences" else _by_formula
+    return Horizon(*(column[lead:] for column in by(track, interval_s * samples, interval_s)))
+
+
+_whole, _blocks = lru_cache(maxsize=4)(_tabulated), lru_cache(maxsize=64)(_tabulated)
+"""Flights along one track share its table, of some MB if whole, or its blocks."""
 
 
 def carried(horizon: Horizon, by_s: float) -> Horizon:
@@ -74,6 +85,7 @@ def carried(horizon: Horizon, by_s: float) -> Horizon:
     )
 
 
+@lru_cache(maxsize=16)
 def start_yaw(track: Track, references: References) -> float:
     return float(Planner(track, references, _START).horizon(0).yaw_rad[0])
 

@@ -31,9 +31,9 @@ _RADIUS_M, _TURNS_PER_S, _CLIMB_M_S, _START_HEIGHT_M = 2.0, 0.025, 0.03, 2.0
 _INSTANT_S = 1e-9  # tolerance of rounding: times are whole microseconds
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Position and yaw as formulas of time.
+    """Position and yaw as formulas of time; equal to itself alone, as formulas are not compared.
 
     Attributes:
         position: Time in s -> x, y, z in m, ENU.
