@@ -59,20 +59,20 @@ class PlantClient:
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            steps = self._answered(autopilot, received[0]) if received else []
-            step = steps[0] if steps else None
+            step, ahead_us = self._answered(autopilot, received[0]) if received else (None, [])
             self._send()
             due_s = self._end.poll(perf_counter())
             self._send()
             if step:  # while the plant integrates
+                repeated = [each for time_us in ahead_us if (each := autopilot.repeat(time_us)) is not None]
                 if self._ground is None:
                     autopilot.serve()
                 self._frame_came = True
                 self._report_if_unknown(step)
                 datagram = received[0] if received and isinstance(self._end, AutopilotEnd) else None
                 self._keep(AutopilotLog.write, step, datagram)
-                for repeated in steps[1:]:
-                    self._keep(AutopilotLog.write, repeated, b"")
+                for each in repeated:
+                    self._keep(AutopilotLog.write, each, b"")
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
@@ -83,27 +83,24 @@ class PlantClient:
         self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> list[Step]:
+    def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> tuple[Step | None, list[int]]:
         """Answer a datagram, and without ground stations the frames up to the next control sample.
 
-        Those that need no more than their time are flown, too.
+        Return the times of these frames, too: those that need no more than their time are to be flown.
         """
         now_s, end, interval_us = perf_counter(), self._end, autopilot.frame_interval_us
         if self._ground is not None or not isinstance(end, AutopilotEnd):
-            answered = answer(end, autopilot.step, datagram, now_s)
-            return [] if answered is None else [answered]
+            return answer(end, autopilot.step, datagram, now_s), []
         received = end.receive(datagram, now_s)
         if received is None:
-            return []
+            return None, []
         step = autopilot.step(*received)
-        steps, commands, time_us = [step], [], step.command.time_us + interval_us
+        ahead_us, time_us = list[int](), step.command.time_us + interval_us
         while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
-            commands.append(step.command._replace(time_us=time_us))
-            repeated = autopilot.repeat(time_us)
-            steps += [] if repeated is None else [repeated]
+            ahead_us.append(time_us)
             time_us += interval_us
-        end.answer(step.command, step.faults, commands)
-        return steps
+        end.answer(step.command, step.faults, [step.command._replace(time_us=time_us) for time_us in ahead_us])
+        return step, ahead_us
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
         """Write to the log, whose failure ends only flights without ground stations."""
