@@ -145,7 +145,7 @@ class Diagnostics(NamedTuple):
     Attributes:
         qp_status: Result of the QP.
         fallback: Source of the decision if the QP was not solved.
-        solve_time_s: Duration of the QP's solution.
+        solve_time_s: Duration of the QP's solution, and of reading the LPV-MPC's plan from it.
         cost: The QP's objective.
         active: Active constraints at the solution.
         slack: Largest violation of a soft limit, in parts of it.

@@ -29,7 +29,7 @@ from colibri.mavlink.ulog.log import TopicReader
 
 Report: TypeAlias = dict[str, Any]
 
-_SMALL_M = 0.01
+_SMALL_M, _TINY_M = 0.01, 0.5e-6
 _INSTANT_S = 1e-6  # times are whole microseconds
 
 
@@ -180,7 +180,9 @@ def _estimation_rows(figures: Report) -> dict[str, str]:
 
 
 def length(metres: float) -> str:
-    """Format a length, small ones in mm."""
+    """Format a length, small ones in mm, and what would be 0.000 mm in nm."""
+    if 0.0 < metres < _TINY_M:
+        return f"{1e9 * metres:.3g} nm"
     return f"{metres:.4f} m" if metres >= _SMALL_M else f"{1e3 * metres:.3f} mm"
 
 
