@@ -10,6 +10,7 @@ from contextlib import closing
 from importlib.metadata import version
 from itertools import islice, takewhile
 from multiprocessing import active_children, current_process, get_context, parent_process
+from multiprocessing.util import Finalize
 from threading import Thread
 from time import perf_counter
 from typing import Any, Protocol, TypeAlias, TypeVar
@@ -39,6 +40,7 @@ class Engine(Protocol):
         """Yield each job with its result, in order of completion; `work` and `common` are pickled."""
 
 
+_LAST = -1000  # after what multiprocessing does at the end
 _AHEAD = 2  # jobs submitted per worker, so that no worker waits
 _NO_GUARD = 'worker processes cannot load the script: flights must begin under `if __name__ == "__main__":`'
 
@@ -109,7 +111,15 @@ def _begin(packed: bytes, has_begun: Any) -> None:
     has_begun.set()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
+    Finalize(None, _end_at_once, exitpriority=_LAST)
     _given = cloudpickle.loads(packed)
+
+
+def _end_at_once() -> None:
+    """End without taking the interpreter apart, which takes 0.2 s once code is compiled."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _do(job: Any) -> Any:
