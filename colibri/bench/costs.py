@@ -174,6 +174,10 @@ class _Answers(Endpoint):
         self._waiting = next(self._answers)
         self._answered_s = perf_counter()
         self.times_us: list[float] = []
+        self.kept: Address | None = None
+
+    def keep_to(self, peer: Address) -> None:
+        self.kept = peer
 
     def send(self, _datagram: bytes, _address: Address | None = None) -> None:
         self.times_us.append((perf_counter() - self._answered_s) * 1e6)

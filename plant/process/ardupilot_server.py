@@ -12,7 +12,7 @@ import msgspec
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
-from colibri.common.types import Address
+from colibri.common.types import Address, PerRotor
 from colibri.mavlink.hil.lockstep import is_another
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.udp import UdpLink, is_bound
@@ -36,7 +36,7 @@ from colibri.plant.vehicle.rotor_numbering import Numbering
 _MAGIC = {Struct("<HHI16H"): 18458, Struct("<HHI32H"): 29569}
 _FORMATS = {form.size: form for form in _MAGIC}
 _FIRST_ROTOR = 3
-_MIN_PULSE_US, _PULSE_RANGE_US = 1000.0, 1000.0
+_MIN_PULSE_US, _MAX_PULSE_US, _PULSE_RANGE_US = 1000, 2000, 1000.0
 _SECOND_US = 1_000_000
 _MIN_RATE_HZ = 10
 
@@ -52,7 +52,9 @@ class ArduPilotEnd:
         rotors: Rotors,
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
-        self._physics, self._motors, self._rotors, self._is_there = physics, motors, rotors, is_there
+        self._physics, self._is_there = physics, is_there
+        self._fields = [_FIRST_ROTOR + motors.rotors.index(rotor) for rotor in range(rotors.count)]
+        self._speeds = _speeds_by_pulse(rotors)
         self._start = self.world = start
         self.peer: Address | None = None
         self.steps = self.restarts = 0
@@ -72,7 +74,7 @@ class ArduPilotEnd:
         if rate_hz < _MIN_RATE_HZ:
             self.dropped["frame rate"] += 1
             return None
-        if is_another(sender, self.peer, now_s - self._received_s, self._is_there):
+        if sender != self.peer and not self._accepts(sender, now_s):
             self.dropped["second autopilot"] += 1
             return None
         self.peer, self._received_s = sender, now_s
@@ -83,22 +85,29 @@ class ArduPilotEnd:
             self.world, self._carried = self._start, 0
             self.restarts += 1
         self._count = count
-        self._advance(rate_hz, fields[_FIRST_ROTOR : _FIRST_ROTOR + self._rotors.count])
+        self._advance(rate_hz, fields)
         self._reply = _encode(self.world, self._physics)
         return self._reply
 
-    def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
+    def accepts_another(self, now_s: float) -> bool:
+        """Whether the peer is lost, so that another ArduPilot may take over."""
+        return self._accepts(None, now_s)
+
+    def _accepts(self, sender: Address | None, now_s: float) -> bool:
+        return not is_another(sender, self.peer, now_s - self._received_s, self._is_there)
+
+    def _advance(self, rate_hz: int, fields: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
-        controls = tuple(map(_control, pulses_us))
-        turning = any(controls)  # disarmed, ArduPilot sends the least pulse or none
-        speeds = self._rotors.speeds_of(self._motors.to_vehicle(controls))
+        speeds = tuple([self._speeds[min(fields[field], _MAX_PULSE_US)] for field in self._fields])
+        turning = any(speeds)  # disarmed, ArduPilot sends the least pulse or none
         command = ActuatorCommand(self.world.time_us, speeds, turning)
         self.world = self._physics.step(self.world, command, duration_us)
         self.steps += 1
 
 
-def _control(pulse_us: int) -> float:
-    return min(max((pulse_us - _MIN_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0)
+def _speeds_by_pulse(rotors: Rotors) -> PerRotor:
+    """Return rotor speeds, in parts of the largest, by the pulse in µs."""
+    return rotors.speeds_of(tuple([max(us - _MIN_PULSE_US, 0) / _PULSE_RANGE_US for us in range(_MAX_PULSE_US + 1)]))
 
 
 def _encode(world: World, physics: Physics) -> bytes:
@@ -156,6 +165,8 @@ class ArduPilotServer:
             if received is not None:
                 self._answer(received, now_s)
             elif self._end.peer:
+                if self._link.kept is not None and self._end.accepts_another(now_s):
+                    self._link.release()
                 self._silence.lasts(now_s, "no request", self._end.world.time_us, ", waiting for ArduPilot")
         self._report(self._end.world.time_us, "ended", "ended")
 
@@ -171,6 +182,8 @@ class ArduPilotServer:
             if reply is None:
                 continue
             self._link.send(reply, sender)
+            if self._link.kept is None:
+                self._link.keep_to(sender)
             self._silence.end(now_s)
             if self._end.restarts > restarts:
                 self._report(before.time_us, "gone", "ArduPilot has begun again, the flight before ended")

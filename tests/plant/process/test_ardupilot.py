@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from math import atan2, radians
 from pathlib import Path
+from time import perf_counter
 
 import msgspec
 import numpy as np
@@ -188,6 +189,24 @@ def test_the_process_answers_and_keeps_its_log(plant: Process, tmp_path: Path) -
     assert ended["steps"] == 300
     times_s = topic_rows(tmp_path / "out")["t"]
     assert (len(times_s), times_s[-1]) == (300, 0.75)
+
+
+def test_another_ardupilot_is_served_once_the_first_is_gone(plant: Process) -> None:
+    """Each comes from a port of its own; while the first is there, Linux drops what others send."""
+    url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
+    for _ in range(2):
+        with closing(open_link(url)) as link:
+            for count in range(3):
+                told = {"timestamp": -1.0}
+                give_up_s = perf_counter() + GIVE_UP_AFTER_S
+                while told["timestamp"] != (count + 1) / 400:
+                    assert perf_counter() < give_up_s
+                    link.send(request(count))  # ArduPilot asks again, too
+                    received = link.receive(0.1)
+                    told = read(received[0]) if received else told
+    plant.process.terminate()
+    assert plant.wait() == 143
+    assert [event["steps"] for event in (*plant.events("gone"), *plant.events("ended"))] == [3, 3]
 
 
 @pytest.mark.parametrize("whom", ["colibri", "ardupilot-json"])

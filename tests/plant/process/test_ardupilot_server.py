@@ -31,6 +31,7 @@ class Script:
         self._requests = requests
         self.now_s = 100.0
         self.sent: list[bytes] = []
+        self.kept: Address | None = None
 
     def __bool__(self) -> bool:
         return not self._requests
@@ -50,6 +51,12 @@ class Script:
 
     def send(self, datagram: bytes, _address: Address) -> None:
         self.sent.append(datagram)
+
+    def keep_to(self, peer: Address) -> None:
+        self.kept = peer
+
+    def release(self) -> None:
+        self.kept = None
 
 
 def flight(began_s: float, steps: int, every_s: float) -> list[tuple[float, bytes]]:
