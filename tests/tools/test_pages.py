@@ -32,6 +32,16 @@ def test_a_page_is_written_with_its_pictures(page: str, tmp_path: Path, monkeypa
     assert (tmp_path / f"{page}.png").exists() is (DOCS / f"{page}.png").exists()
 
 
+@pytest.mark.parametrize("page", ["tables", "latence"])
+def test_what_is_no_page_is_refused(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["pages", page, str(tmp_path)])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert page in capsys.readouterr().err.splitlines()[-1]
+
+
 def flown(seed: int = 0, *, drift_m_s: float = 0.1, tilt_deg: float = 15.0, rights: bool = True) -> RotorLossFlight:
     """Return a flight that tilts to 40° for 0.2 s, sinks from 4 m at 1 m/s, and rests after a touch-down at 4 s."""
     t = np.arange(-100, 1250) * 0.004
