@@ -148,7 +148,6 @@ class Air:
         """Replace the mean wind; gusts and turbulence stay."""
         self._wind = wind
         self._mean = wind.velocity_at(0.0) if wind.constant else None
-        self._mean_direction = _direction(self._mean or CALM)
         self.steady = None if self._gusts or self._w20_knots else self._mean
 
     def begin(self, height_m: float) -> tuple[Vector, Eddies | None]:
@@ -165,12 +164,12 @@ class Air:
         """Return velocity, ENU, m/s, and turbulence at the end of a frame that began with `eddies`."""
         time_s = time_us * 1e-6
         wind = self._mean_at(time_s)
-        moving = self._with_gusts(wind, time_s) if self._gusts else wind
+        moving = self._with_gusts(wind, time_s)
         if self._w20_knots is None or eddies is None:
             return moving, None
         x, y, z = velocity_enu_m_s
         airspeed, noise = hypot(x - wind[0], y - wind[1], z - wind[2]), self._turbulence.noise(eddies.frame)
-        duration_s, (east, north) = duration_us * 1e-6, self._mean_direction if self._mean else _direction(wind)
+        duration_s, (east, north) = duration_us * 1e-6, _direction(wind)
         air, lags = _go_on(eddies.lags, noise, self._w20_knots, height_m, airspeed, duration_s, moving, east, north)
         return air, Eddies(eddies.frame + 1, lags)
 

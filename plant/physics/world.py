@@ -81,8 +81,7 @@ class Physics:
         """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
         time_us, wind = world.time_us, self._air.steady
         if wind is None:
-            at = self._wind
-            at[0], at[1], at[2] = world.wind_enu_m_s  # a third of the time of a slice
+            self._wind[:] = world.wind_enu_m_s
         target = self._target(command)
         if self._noise is not None:
             target = self._disturb(self._noise, target, time_us, duration_us)

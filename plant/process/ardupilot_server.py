@@ -12,7 +12,7 @@ import msgspec
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
-from colibri.common.types import Address, PerRotor
+from colibri.common.types import Address
 from colibri.mavlink.hil.lockstep import is_another
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.udp import UdpLink, is_bound
@@ -53,8 +53,8 @@ class ArduPilotEnd:
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
         self._physics, self._is_there = physics, is_there
-        self._fields = [_FIRST_ROTOR + motors.rotors.index(rotor) for rotor in range(rotors.count)]
-        self._speeds = _speeds_by_pulse(rotors)
+        self._rotor_fields = [_FIRST_ROTOR + motors.rotors.index(rotor) for rotor in range(rotors.count)]
+        self._speed_of_pulse = _speed_of_pulse(rotors)
         self._start = self.world = start
         self.peer: Address | None = None
         self.steps = self.restarts = 0
@@ -74,7 +74,7 @@ class ArduPilotEnd:
         if rate_hz < _MIN_RATE_HZ:
             self.dropped["frame rate"] += 1
             return None
-        if sender != self.peer and not self._accepts(sender, now_s):
+        if not self.accepts_another(now_s, sender):
             self.dropped["second autopilot"] += 1
             return None
         self.peer, self._received_s = sender, now_s
@@ -89,24 +89,21 @@ class ArduPilotEnd:
         self._reply = _encode(self.world, self._physics)
         return self._reply
 
-    def accepts_another(self, now_s: float) -> bool:
-        """Whether the peer is lost, so that another ArduPilot may take over."""
-        return self._accepts(None, now_s)
-
-    def _accepts(self, sender: Address | None, now_s: float) -> bool:
+    def accepts_another(self, now_s: float, sender: Address | None = None) -> bool:
+        """Whether the peer is lost, so that another ArduPilot may take over, or is the sender."""
         return not is_another(sender, self.peer, now_s - self._received_s, self._is_there)
 
     def _advance(self, rate_hz: int, fields: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
-        speeds = tuple([self._speeds[min(fields[field], _MAX_PULSE_US)] for field in self._fields])
+        speeds = tuple([self._speed_of_pulse[min(fields[at], _MAX_PULSE_US)] for at in self._rotor_fields])
         turning = any(speeds)  # disarmed, ArduPilot sends the least pulse or none
         command = ActuatorCommand(self.world.time_us, speeds, turning)
         self.world = self._physics.step(self.world, command, duration_us)
         self.steps += 1
 
 
-def _speeds_by_pulse(rotors: Rotors) -> PerRotor:
-    """Return rotor speeds, in parts of the largest, by the pulse in µs."""
+def _speed_of_pulse(rotors: Rotors) -> tuple[float, ...]:
+    """Return the rotor speed, in parts of the largest, of each pulse from 0 µs on."""
     return rotors.speeds_of(tuple([max(us - _MIN_PULSE_US, 0) / _PULSE_RANGE_US for us in range(_MAX_PULSE_US + 1)]))
 
 

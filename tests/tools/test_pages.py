@@ -33,7 +33,7 @@ def test_a_page_is_written_with_its_pictures(page: str, tmp_path: Path, monkeypa
 
 
 @pytest.mark.parametrize("page", ["tables", "latence"])
-def test_what_is_no_page_is_refused(
+def test_a_wrong_page_is_refused(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["pages", page, str(tmp_path)])

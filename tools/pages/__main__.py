@@ -23,7 +23,7 @@ def main() -> int:
         parser.error(f"{asked.page} needs {error.name}: make .venv/.more")
     write = getattr(module, "write", None)
     if not (write or hasattr(module, "PAGES")):
-        parser.error(f"{asked.page} is a part of others, and writes no page")
+        parser.error(f"{asked.page} belongs to other pages, and writes none")
     for page, renewed in getattr(module, "PAGES", {}).items():
         (asked.folder / page).write_text(renewed((asked.folder / page).read_text(encoding="utf-8")), encoding="utf-8")
     return 1 if write and write(asked.folder) is False else 0

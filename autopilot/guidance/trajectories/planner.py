@@ -17,6 +17,7 @@ _VERTICAL_SPEED_DECIMALS = 8
 _SNAP, _YAW_ACCELERATION = 4, 2
 _STILL = 1e-3  # speed in m/s (likewise for higher derivatives) below which the direction is undefined
 _BLOCK_SAMPLES = 512
+_SHARED_SAMPLES = 20_000  # 160 s at 125 Hz; a longer table is not kept
 _START = Preview(interval_us=100_000, samples=1)
 
 
@@ -52,9 +53,11 @@ class Planner:
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        tabulated = _whole if self._rest is not None else _blocks
-        table = tabulated(self._track, self._references, self.preview, self._length, block)
-        return Horizon(*(column.copy() for column in table))  # what a law writes there stays in its flight
+        asked = (self._track, self._references, self.preview, self._length, block)
+        if self._length > _SHARED_SAMPLES:
+            return _tabulated(*asked)
+        shared = (_blocks if self._rest is None else _whole)(*asked)
+        return Horizon(*(column.copy() for column in shared))  # laws might write to them
 
 
 def _tabulated(track: Track, references: References, preview: Preview, length: int, block: int) -> Horizon:
@@ -66,7 +69,7 @@ def _tabulated(track: Track, references: References, preview: Preview, length: i
 
 
 _whole, _blocks = lru_cache(maxsize=4)(_tabulated), lru_cache(maxsize=64)(_tabulated)
-"""Flights along one track share its table, of some MB if whole, or its blocks."""
+"""Flights along one track share its table, of at most 3 MB, or its blocks, of 0.1 MB."""
 
 
 def carried(horizon: Horizon, by_s: float) -> Horizon:

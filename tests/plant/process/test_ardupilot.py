@@ -192,7 +192,7 @@ def test_the_process_answers_and_keeps_its_log(plant: Process, tmp_path: Path) -
 
 
 def test_another_ardupilot_is_served_once_the_first_is_gone(plant: Process) -> None:
-    """Each comes from a port of its own; while the first is there, Linux drops what others send."""
+    """Each has its own port; until the first is gone, Linux drops the packets of others."""
     url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
     for _ in range(2):
         with closing(open_link(url)) as link:
