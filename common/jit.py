@@ -18,6 +18,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 Packed: TypeAlias = NDArray[np.void]
 
 _LINE = 64  # bytes of a cache line
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}  # C calls no kernel: compiled sooner
 
 _Numbers: TypeAlias = tuple[np.dtype[Any], tuple[int, ...]]
 _Form: TypeAlias = tuple[tuple[str, ...], tuple[Any, ...]]
@@ -129,7 +130,7 @@ class _Compiling(Listener):
 
 
 def _kernel(function: Callable[..., Any], **options: Any) -> Any:
-    kernel: Any = njit(error_model="numpy", **options)(function)
+    kernel: Any = njit(**_OPTIONS, **options)(function)
     machine_code = kernel._cache = MachineCode(kernel)  # noqa: SLF001
     kernel.compile = machine_code.in_turn(kernel.compile)
     return kernel

@@ -14,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, Model
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import Packed, compiled, inlined
+from colibri.common.jit import Packed, compiled, inlined, opened, packed
 from colibri.common.types import Array
 
 DEVIATIONS = 12
@@ -182,31 +182,41 @@ def _advance(X: Array, n: int, T: StepTransition, h: float) -> None:
             X[n + 1, RATE + i, c] = 0.0 + ww0 * w0 + ww1 * w1 + ww2 * w2
 
 
+class _Linearised(NamedTuple):
+    motion: Array  # (N + 1, 13)
+    speeds: Array  # squared, (N + 1, m)
+    transition: StepTransition
+
+
 @compiled
-def _hover(thrust_n: float, packed: Packed, T: StepTransition, X: Array) -> None:
-    model = packed[0]
-    level, squared = np.zeros((2, RIGID)), np.empty((2, len(model.momentum)))
+def _fill_transition(flight: Packed, vehicle: Packed) -> None:
+    _linearise(flight[0].motion, flight[0].speeds, vehicle[0], flight[0].transition)
+
+
+def hover_transition(thrust_n: float, vehicle: Packed, steps: int) -> tuple[Array, Array]:
+    """Return A, (12 + m, 12 + m), and B, (12 + m, m), of deviations and squared speeds in level flight.
+
+    With the `steps` of a plan, what is compiled is compiled once for both.
+    """
+    rotors, h, level = vehicle["momentum"].shape[1], vehicle["interval_s"][0], np.zeros((steps + 1, RIGID))
     level[:, 6] = 1.0
-    total = 0.0
-    for i in range(len(model.momentum)):
-        total += model.allocation[0, i]
-    squared[:] = thrust_n / total
-    _linearise(level, squared, model, T)
-    X[0] = np.eye(DEVIATIONS)
-    _advance(X, 0, T, model.interval_s)
-
-
-def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:
-    """Return A, (12 + m, 12 + m), and B, (12 + m, m), of deviations and squared speeds in level flight."""
-    rotors = packed["momentum"].shape[1]
-    T, X = empty_transition(1, rotors), np.empty((2, DEVIATIONS, DEVIATIONS))
-    _hover(thrust_n, packed, T, X)
-    lag, n = packed[0]["lag"], DEVIATIONS + rotors
+    speeds = np.full((steps + 1, rotors), thrust_n / np.cumsum(vehicle["allocation"][0, 0])[-1])
+    flight = packed(_Linearised(level, speeds, empty_transition(steps, rotors)))
+    _fill_transition(flight, vehicle)
+    T = StepTransition(*(part[..., 0] for part in opened(flight["transition"], StepTransition)))
+    lag, n, one, none = vehicle[0]["lag"], DEVIATIONS + rotors, np.eye(3), np.zeros((3, 3))
     A, B = np.zeros((n, n)), np.zeros((n, rotors))
-    A[:DEVIATIONS, :DEVIATIONS] = X[1]
-    effects = np.concatenate([part[:, :, 0] for part in (T.place, T.force, T.turn, T.moment)])
+    A[:DEVIATIONS, :DEVIATIONS] += np.block(
+        [
+            [one, h * one, T.position_rotation, T.position_rate],
+            [none, one + T.drag, T.velocity_rotation, T.velocity_rate],
+            [none, none, T.rotation, T.rotation_rate],
+            [none, none, none, T.rate],
+        ]
+    )
+    effects = np.concatenate([T.place, T.force, T.turn, T.moment])
     A[:DEVIATIONS, DEVIATIONS:], B[:DEVIATIONS] = effects * lag["left_mean"], effects * (1.0 - lag["left_mean"])
-    A[RATE + 2, DEVIATIONS:] += T.spin[:, 0] * (lag["left"] - 1.0)
-    B[RATE + 2] += T.spin[:, 0] * (1.0 - lag["left"])
+    A[RATE + 2, DEVIATIONS:] += T.spin * (lag["left"] - 1.0)
+    B[RATE + 2] += T.spin * (1.0 - lag["left"])
     A[DEVIATIONS:, DEVIATIONS:], B[DEVIATIONS:] = lag["left"] * np.eye(rotors), (1.0 - lag["left"]) * np.eye(rotors)
     return A, B

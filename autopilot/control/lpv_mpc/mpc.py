@@ -150,7 +150,7 @@ class Mpc:
 
     def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
         """Return S of the LQR in level flight after the horizon, filled up with zeros to a multiple of four."""
-        A, B = deviations.hover_transition(thrust_n, self.model)
+        A, B = deviations.hover_transition(thrust_n, self.model, self.horizon)
         Q, rotors = np.zeros_like(A), B.shape[1]
         of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
         np.fill_diagonal(Q, np.array([*of_axes, *([weights.rate] * 3), *([0.0] * rotors)]) / count_every)
