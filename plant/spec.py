@@ -133,7 +133,7 @@ class PlantSpec(WorldSpec, ProcessSpec):
         float | None, Option("multiple of real time (default: max; with --realtime 1)", "N", above=0.0, endless=True)
     ] = None
     tlog: Annotated[bool, Option("also write each MAVLink frame to flight.tlog in --out")] = False
-    truth: Annotated[bool, Option("for tests: append the true state to each frame")] = False
+    truth: Annotated[bool, Option("for tests: append the true state to each frame of sensors")] = False
 
     @property
     def pace(self) -> float:

@@ -12,6 +12,7 @@ from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
+from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PaceChange, WorldChange
 from colibri.mavlink.links.udp import UdpLink, is_bound
@@ -50,7 +51,7 @@ class FramePacer:
 
 
 class Server:
-    """The plant's end of the lockstep; with `streams_truth`, the true state follows each frame."""
+    """The plant's end of the lockstep; with `streams_truth`, the true state follows each frame of sensors."""
 
     def __init__(
         self,
@@ -126,7 +127,8 @@ class Server:
         world = plant.world
         frame, plant_status = plant.measure(with_battery=self._end.sends_battery(world.time_us))
         now_s = perf_counter()
-        self._end.offer(frame, now_s, plant_status, state_frame(world) if self._streams_truth else None)
+        truth = state_frame(world) if self._streams_truth and isinstance(frame, SensorFrame) else None
+        self._end.offer(frame, now_s, plant_status, truth)
         sent = self._send()
         self._log_traffic([])  # while the autopilot computes
         self._time_us = world.time_us

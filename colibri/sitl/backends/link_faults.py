@@ -125,7 +125,8 @@ class QuickClock:
 
 LinkClock: TypeAlias = StoppedClock | QuickClock
 
-_HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
+_HEADER_BYTES, _CRC_BYTES, _SYSTEM_AT, _COMPONENT_AT, _MESSAGE_AT = 10, 2, 5, 6, 7
+_STATE = int(mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION).to_bytes(3, "little")  # what a frame of state begins with
 _ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")
 
 
@@ -148,15 +149,27 @@ def answers(datagram: bytes, time_us: int) -> bool:
     sought = time_us.to_bytes(8, "little")
     at = 0
     while at < len(datagram):
-        if datagram[at + 7 : at + _HEADER_BYTES] == _ANSWER and datagram[at + _HEADER_BYTES : at + 18] == sought:
+        begins = at + _HEADER_BYTES
+        if datagram[at + _MESSAGE_AT : begins] == _ANSWER and datagram[begins : begins + len(sought)] == sought:
             return True
-        at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+        at = _next(datagram, at)
     return False
 
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
-    """Split a plant's datagram into the part for the autopilot and the truth behind it."""
+    """Return the part of a plant's datagram for the autopilot, and the true state: behind it, or the frame's own."""
+    if datagram[_MESSAGE_AT:_HEADER_BYTES] == _STATE:
+        return datagram, datagram[: _next(datagram, _next(datagram, 0))]
     at = 0
     while at < len(datagram) and datagram[at + _COMPONENT_AT] != TRUTH_COMPONENT:
-        at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+        at = _next(datagram, at)
     return datagram[:at], datagram[at:]
+
+
+def source_of(message: bytes) -> bytes:
+    return message[_SYSTEM_AT:_MESSAGE_AT]
+
+
+def _next(datagram: bytes, at: int) -> int:
+    """Return where the message after that at byte `at` begins."""
+    return at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES

@@ -18,7 +18,7 @@ from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
-from colibri.sitl.backends.link_faults import Instant, Pipe, SessionError, Trouble, answers, parted
+from colibri.sitl.backends.link_faults import Instant, Pipe, SessionError, Trouble, answers, parted, source_of
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.errors import SitlError
@@ -39,7 +39,6 @@ class LockstepSession:
         self.autopilot = autopilot
         self._codec = dialect.Codec(system, dialect.AUTOPILOT_COMPONENT)
         self._autopilot_source = bytes(self._codec.source)
-        self._truth_source = bytes((system, dialect.TRUTH_COMPONENT))
         self.acks: list[tuple[int, int]] = []
         self.trouble = Trouble()
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
@@ -120,7 +119,7 @@ class LockstepSession:
         for other in others:
             self._read_acks(other)
         frame, true_state = parted(datagram)
-        truth = read_state(true_state, self._truth_source) or self._decoded_state(true_state)
+        truth = read_state(true_state, source_of(true_state)) or self._decoded_state(true_state)
         if truth is None:
             raise SessionError("the state of the vehicle is not finite")
         return frame, truth

@@ -12,6 +12,7 @@ from colibri.flights.flight import MEMORY_ADDRESS, NEVER_LATE_S
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.physics.start import IntegrationError
 from colibri.plant.physics.world import state_frame
 from colibri.plant.process.server import builder_of
@@ -73,7 +74,8 @@ class MemoryPlant:
             self.plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
         frame, plant_status = self.plant.measure()
-        end.offer(frame, self.clock.now_s(), plant_status, state_frame(self.plant.world))
+        truth = state_frame(self.plant.world) if isinstance(frame, SensorFrame) else None
+        end.offer(frame, self.clock.now_s(), plant_status, truth)
 
 
 class MemoryAutopilot:
