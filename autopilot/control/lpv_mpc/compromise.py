@@ -9,6 +9,7 @@ while the vehicle is near them. The QP
 is solved by ADMM: Boyd et al., Foundations and Trends in Machine Learning 3, 2011.
 """
 
+from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
 
@@ -56,6 +57,7 @@ class Deviation(NamedTuple):
         return Deviation(-1, np.zeros((2, 3)), np.zeros((PIECES + 3, 3)), np.zeros((PIECES, 3)))
 
 
+@lru_cache(maxsize=4)
 def compromise(interval_s: float) -> Compromise:
     d, columns = STRIDE * interval_s, PIECES + _FIXED
     P, V, A = (np.zeros((PIECES, columns)) for _ in range(3))
