@@ -19,6 +19,7 @@ import cloudpickle
 
 from colibri.campaigns.factors import CampaignError
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.flights import launcher
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -46,7 +47,10 @@ _NO_GUARD = 'worker processes cannot load the script: flights must begin under `
 
 
 class Pool:
-    """A pool of processes. A killed worker breaks it; submitted jobs are then repeated one by one."""
+    """A pool of processes, forked if possible, as loading takes longer than short flights.
+
+    A killed worker breaks it; submitted jobs are then repeated one by one.
+    """
 
     is_remote = False
 
@@ -66,7 +70,7 @@ class Pool:
     def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
         """Yield jobs with results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
-        context = get_context("spawn")
+        context = get_context("fork" if launcher.can_fork() else "spawn")
         try:
             has_begun = context.Event()
         except OSError as error:
@@ -112,6 +116,7 @@ def _begin(packed: bytes, has_begun: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
     Finalize(None, _end_at_once, exitpriority=_LAST)
+    sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__  # of a fork, without the bar
     _given = cloudpickle.loads(packed)
 
 
@@ -164,7 +169,7 @@ def with_bar(done: Iterable[Done], title: str, total: int, *, quiet: bool) -> Ge
     from rich.progress import Progress
 
     console = Console(stderr=True)
-    with Progress(console=console, disable=quiet or not console.is_terminal) as bar:
+    with Progress(console=console, disable=quiet or not console.is_terminal, auto_refresh=False) as bar:
         yield from bar.track(done, total, description=title)
 
 

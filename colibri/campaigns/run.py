@@ -124,21 +124,24 @@ class FlightBar:
         texts, numbers = ("{task.fields[rate]}", "{task.fields[lost]}"), (BarColumn(), MofNCompleteColumn())
         columns = ("{task.description}", *numbers, *texts, TimeRemainingColumn())
         hidden = quiet or not console.is_terminal
-        self._bar = Progress(*columns, console=console, disable=hidden, speed_estimate_period=300.0)
+        self._bar = Progress(  # without a thread, which would keep workers from being forked
+            *columns, console=console, disable=hidden, auto_refresh=False, speed_estimate_period=300.0
+        )
         self._task = self._bar.add_task(escape(title), total=flights, rate="", lost="", start=False)
         self._flown = self._lost = 0
 
     def begun(self, kept: int) -> None:
         self._bar.start()
         self._bar.start_task(self._task)
-        self._bar.update(self._task, completed=kept)
+        self._bar.update(self._task, completed=kept, refresh=True)
 
     def ended(self, flown: FlightResult) -> None:
         self._flown += 1
         self._lost += flown.verdict.is_lost
         elapsed_s = self._bar.tasks[self._task].elapsed or 0.0
         rate = f"{self._flown / elapsed_s:.1f} flights/s" if elapsed_s else ""
-        self._bar.update(self._task, advance=1, rate=rate, lost=f"{100.0 * self._lost / self._flown:.1f} % lost")
+        lost = f"{100.0 * self._lost / self._flown:.1f} % lost"
+        self._bar.update(self._task, advance=1, rate=rate, lost=lost, refresh=True)
 
     def close(self) -> None:
         self._bar.stop()

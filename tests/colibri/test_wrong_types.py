@@ -124,7 +124,11 @@ def test_objects_of_one_name_are_values_of_a_grid() -> None:
 
 def test_a_script_without_a_guard_ends_with_one_line(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
-    script.write_text('import colibri\ncolibri.campaign(fly={"track": "hover", "duration": 0.1}, workers=1)\n')
+    script.write_text(
+        "import colibri, threading\n"
+        "threading.Thread(target=threading.Event().wait, daemon=True).start()\n"  # so nothing is forked
+        'colibri.campaign(fly={"track": "hover", "duration": 0.1}, workers=1)\n'
+    )
     ran = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert ran.returncode == 1
     assert ran.stderr == (

@@ -12,6 +12,13 @@ from colibri.campaigns.engines import Pool
 KILLS = -1
 
 
+loaded = ""
+
+
+def what_is_loaded(_common: None, _job: int) -> str:
+    return loaded
+
+
 def doubled(common: int, job: int) -> int:
     """Return a job times what is common; some kill whoever does them."""
     if job == KILLS:

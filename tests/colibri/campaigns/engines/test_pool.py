@@ -39,6 +39,13 @@ def test_jobs_are_taken_as_they_are_needed() -> None:
     assert len(taken) <= 4
 
 
+@pytest.mark.parametrize("forks", [True, False])
+def test_forked_workers_have_what_is_loaded(forks: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.flights.launcher.can_fork", lambda: forks)
+    monkeypatch.setattr(jobs, "loaded", "here")
+    assert dict(Pool(2).each(jobs.what_is_loaded, None, range(4))) == dict.fromkeys(range(4), "here" if forks else "")
+
+
 def workers(folder: Path, number: int) -> list[psutil.Process]:
     until_s = monotonic() + PATIENCE_S
     while len(names := [path.name for path in folder.iterdir()]) < number:
