@@ -16,6 +16,7 @@ from time import perf_counter
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 import cloudpickle
+import numpy as np
 
 from colibri.campaigns.factors import CampaignError
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
@@ -117,6 +118,7 @@ def _begin(packed: bytes, has_begun: Any) -> None:
     Thread(target=_end_with_parent, daemon=True).start()
     Finalize(None, _end_at_once, exitpriority=_LAST)
     sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__  # of a fork, without the bar
+    np.random.seed()  # noqa: NPY002 - forks would all draw the same numbers
     _given = cloudpickle.loads(packed)
 
 

@@ -7,6 +7,8 @@ from contextlib import closing
 from pathlib import Path
 from time import sleep
 
+import numpy as np
+
 from colibri.campaigns.engines import Pool
 
 KILLS = -1
@@ -24,6 +26,10 @@ def doubled(common: int, job: int) -> int:
     if job == KILLS:
         os.kill(os.getpid(), signal.SIGKILL)
     return common * job
+
+
+def drawn(_common: None, _job: int) -> float:
+    return float(np.random.random())  # noqa: NPY002
 
 
 def named(folder: str, job: int) -> None:

@@ -46,6 +46,11 @@ def test_forked_workers_have_what_is_loaded(forks: bool, monkeypatch: pytest.Mon
     assert dict(Pool(2).each(jobs.what_is_loaded, None, range(4))) == dict.fromkeys(range(4), "here" if forks else "")
 
 
+def test_forked_workers_draw_other_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.flights.launcher.can_fork", lambda: True)
+    assert dict(Pool(1).each(jobs.drawn, None, [0]))[0] != dict(Pool(1).each(jobs.drawn, None, [0]))[0]
+
+
 def workers(folder: Path, number: int) -> list[psutil.Process]:
     until_s = monotonic() + PATIENCE_S
     while len(names := [path.name for path in folder.iterdir()]) < number:
