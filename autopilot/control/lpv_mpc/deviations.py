@@ -196,7 +196,7 @@ def _fill_transition(flight: Packed, vehicle: Packed) -> None:
 def hover_transition(thrust_n: float, vehicle: Packed, steps: int) -> tuple[Array, Array]:
     """Return A, (12 + m, 12 + m), and B, (12 + m, m), of deviations and squared speeds in level flight.
 
-    With the `steps` of a plan, what is compiled is compiled once for both.
+    It shares the compiled code of a plan of as many `steps`.
     """
     rotors, h, level = vehicle["momentum"].shape[1], vehicle["interval_s"][0], np.zeros((steps + 1, RIGID))
     level[:, 6] = 1.0

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 from colibri.common.errors import unknown
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
-from colibri.mavlink.wire.dialect import TRUTH_COMPONENT, mav
+from colibri.mavlink.wire.dialect import CRC_BYTES, HEADER_BYTES, TRUTH_COMPONENT, mav
 from colibri.sitl.errors import SitlError
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
@@ -125,7 +125,7 @@ class QuickClock:
 
 LinkClock: TypeAlias = StoppedClock | QuickClock
 
-_HEADER_BYTES, _CRC_BYTES, _SYSTEM_AT, _COMPONENT_AT, _MESSAGE_AT = 10, 2, 5, 6, 7
+_SYSTEM_AT, _COMPONENT_AT, _MESSAGE_AT = 5, 6, 7  # bytes of a MAVLink 2 header
 _STATE = int(mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION).to_bytes(3, "little")  # what a frame of state begins with
 _ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")
 
@@ -149,7 +149,7 @@ def answers(datagram: bytes, time_us: int) -> bool:
     sought = time_us.to_bytes(8, "little")
     at = 0
     while at < len(datagram):
-        begins = at + _HEADER_BYTES
+        begins = at + HEADER_BYTES
         if datagram[at + _MESSAGE_AT : begins] == _ANSWER and datagram[begins : begins + len(sought)] == sought:
             return True
         at = _next(datagram, at)
@@ -158,7 +158,7 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return the part of a plant's datagram for the autopilot, and the true state: behind it, or the frame's own."""
-    if datagram[_MESSAGE_AT:_HEADER_BYTES] == _STATE:
+    if datagram[_MESSAGE_AT:HEADER_BYTES] == _STATE:
         return datagram, datagram[: _next(datagram, _next(datagram, 0))]
     at = 0
     while at < len(datagram) and datagram[at + _COMPONENT_AT] != TRUTH_COMPONENT:
@@ -172,4 +172,4 @@ def source_of(message: bytes) -> bytes:
 
 def _next(datagram: bytes, at: int) -> int:
     """Return where the message after that at byte `at` begins."""
-    return at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+    return at + HEADER_BYTES + datagram[at + 1] + CRC_BYTES
