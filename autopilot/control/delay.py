@@ -86,8 +86,9 @@ class DelayCompensation:
         self.delay_us = min(max(delay_us, 0), MAX_DELAY_US)
 
     def _now(self, frame: StateFrame, voltage_v: float) -> Array:
-        (now_us, position, velocity, attitude, rate), known = frame, self._known
-        x = np.array((*position, *velocity, *attitude, *rate, *self._speeds(self._acting(now_us)[0])))
+        now_us, known = frame.time_us, self._known
+        measured = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
+        x = np.array((*measured, *self._speeds(self._acting(now_us)[0])))
         if known is None or not 0 < now_us - known[0] <= _CONTINUES_US:
             self._disturbance = np.zeros(6)
             return x

@@ -1,7 +1,7 @@
 """The autopilot as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar, TypeVarTuple
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, TypeVarTuple
 
 from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
@@ -10,6 +10,7 @@ from colibri.autopilot.core.defence.table import DELAY, STEP, nothing
 from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.guidance.guidance import Guidance
+from colibri.common.records import Record
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
@@ -24,7 +25,7 @@ T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
 
-class ControlSample(NamedTuple):
+class ControlSample(Record, frozen=True):
     now_us: int  # time of its frame
     state: VehicleState
     guidance: Guidance

@@ -21,7 +21,7 @@ class Reporter:
 
     def report(self, sample: ControlSample, decision: Decision | None, duration_s: float) -> None:
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
-        now_us, state, guidance, _ = sample
+        now_us, state, guidance = sample.now_us, sample.state, sample.guidance
         self.samples += 1
         estimate, charge_state = parts.state_source.estimate, parts.supervisor.charge_state
         fence = stations.fence

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.control.interface import Decision, Horizon
 from colibri.autopilot.estimation.estimate import Estimate
+from colibri.common.records import Record
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.plant_status import PlantStatus
@@ -14,7 +15,7 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
 
 
-class Step(NamedTuple):
+class Step(Record, frozen=True):
     """Answer to a frame: between control samples the last command, without a decision.
 
     Unless the vehicle is `known`, its rotors stand. Without ground stations, a decision has its frame and references.
@@ -38,7 +39,7 @@ def answer(
     received = end.receive(datagram, now_s)
     if received is None:
         return None
-    answered = step(*received)
+    answered = step(received.frame, received.plant_status)
     end.answer(answered.command, answered.faults)
     return answered
 

@@ -5,9 +5,10 @@ from math import ceil
 from typing import NamedTuple
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, Preview
+from colibri.common.records import Record
 
 
-class Guidance(NamedTuple):
+class Guidance(Record, frozen=True):
     """References for the control law, reset if it `begins`; empty on the ground."""
 
     horizon: Horizon | None = None

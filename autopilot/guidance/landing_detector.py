@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.elementary import acos
+from colibri.common.records import Record
 from colibri.common.types import Vector
 
 _BELOW_M, _FAR_BELOW_M = 0.15, 1.0
@@ -35,7 +36,7 @@ STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
 
 
-class Landing(NamedTuple):
+class Landing(Record, frozen=True):
     """Start of the stillness, and the climb rate then."""
 
     since_us: int | None = None

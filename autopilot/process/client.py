@@ -4,6 +4,8 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVarTuple
 
+from msgspec.structs import replace
+
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.process.logs import AutopilotLog
@@ -94,12 +96,12 @@ class PlantClient:
         received = end.receive(datagram, now_s)
         if received is None:
             return None, []
-        step = autopilot.step(*received)
+        step = autopilot.step(received.frame, received.plant_status)
         ahead_us, time_us = list[int](), step.command.time_us + interval_us
         while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
             ahead_us.append(time_us)
             time_us += interval_us
-        end.answer(step.command, step.faults, [step.command._replace(time_us=time_us) for time_us in ahead_us])
+        end.answer(step.command, step.faults, [replace(step.command, time_us=time_us) for time_us in ahead_us])
         return step, ahead_us
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:

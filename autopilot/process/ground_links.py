@@ -97,9 +97,9 @@ class GroundLinks:
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send each datagram; failures are lost datagrams."""
         began_s = self._processor_clock()
-        for number, address, datagram in outbox:
+        for outgoing in outbox:
             try:
-                self._links[number].send(datagram, address)
+                self._links[outgoing.link].send(outgoing.datagram, outgoing.address)
             except LinkError:
                 continue
         self._left_s -= self._processor_clock() - began_s

@@ -16,10 +16,9 @@ from colibri.autopilot.parameters.definitions import definitions
 from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup
 from colibri.common.process.log_files import LogError
 from colibri.common.process.shared_log import SharedLog
-from colibri.common.types import PerRotor
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.mavlink.hil.state import STATE_BYTES, StateFrame
+from colibri.mavlink.hil.state import STATE_BYTES, ActuatorCommand, StateFrame
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import ERROR, INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
@@ -64,7 +63,7 @@ class AutopilotLog:
 
         The `datagram` is empty where only the state was sent, and None in a replay.
         """
-        (time_us, controls, armed), decision, duration_s, estimate, _, _, delay_us, _, _ = step
+        time_us, decision, estimate = step.command.time_us, step.decision, step.estimate
         if time_us < self._time_us:
             self.topics.close()
             self._received_bytes = self._said_bytes = 0
@@ -72,7 +71,7 @@ class AutopilotLog:
             self._fallback, self._begins = None, True
         self._time_us = time_us
         if self.topics.for_viewers:
-            self._write_input(time_us, controls, armed, datagram)
+            self._write_input(step.command, datagram)
         if estimate is not None and estimate.check is not None:
             self.topics.add(FILTER, self._check_row(estimate.check))
         if decision is None:
@@ -82,8 +81,8 @@ class AutopilotLog:
         _, reference, how = decision
         status, fallback, solve_time_s, cost, active, slack, _, _, mass_kg, path_lag_s, iterations = how
         decided = (
-            *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6, duration_s * 1e6,
-            cost, slack, *active, delay_us, mass_kg, path_lag_s, iterations,
+            *reference, STATUS_CODES[status], FALLBACK_CODES[fallback], solve_time_s * 1e6,
+            step.duration_s * 1e6, cost, slack, *active, step.delay_us, mass_kg, path_lag_s, iterations,
         )  # fmt: skip
         self.topics.add(DECISION, (time_us, *decided))
         if self._views is not None:
@@ -143,8 +142,9 @@ class AutopilotLog:
     def close(self) -> None:
         self.topics.close()
 
-    def _write_input(self, time_us: int, controls: PerRotor, armed: bool, datagram: bytes | None) -> None:
+    def _write_input(self, command: ActuatorCommand, datagram: bytes | None) -> None:
         """Write the inputs of a replay; frames of states follow from the truth."""
+        time_us = command.time_us
         if self._begins:
             self._begins = False
             setup = msgspec.structs.replace(self._setup, first_us=time_us)
@@ -154,8 +154,8 @@ class AutopilotLog:
             return
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
             self.topics.queue(encode_input(time_us, RecordKind.FRAME, datagram))
-        first, others = split(controls)
-        self.topics.add(COMMAND, (time_us, *first, armed))
+        first, others = split(command.controls)
+        self.topics.add(COMMAND, (time_us, *first, command.armed))
         if others:
             self.topics.add(MORE_COMMAND, (time_us, *others))
 
@@ -176,10 +176,10 @@ class AutopilotLog:
         known = frame if estimate is None else estimate.frame
         if not isinstance(known, StateFrame):
             return
-        _, place, velocity, attitude, rates = known
+        motion = (*known.position_enu_m, *known.velocity_enu_m_s, *known.attitude, *known.rate_flu_rad_s)
         controls, others = split(step.command.controls if step.command.armed else (nan,) * self._rotors)
         references = _NO_REFERENCES if step.references is None else _first(step.references)
-        row = (self._time_us, *place, *velocity, *attitude, *rates, *controls, *references, *decided, *others)
+        row = (self._time_us, *motion, *controls, *references, *decided, *others)
         self.topics.add(samples, row)
         if estimate is not None and isinstance(frame, SensorFrame):
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))

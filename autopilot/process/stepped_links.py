@@ -72,7 +72,7 @@ class SteppedLinks:
         return self._taken() if self._waiting else ()
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
-        parcels = [Parcel(address[1], datagram) for _, address, datagram in outbox if address is not None]
+        parcels = [Parcel(it.address[1], it.datagram) for it in outbox if it.address is not None]
         mode, armed = self._state()
         self._conductor.send(StepMessage(self._time_us, parcels, custom_mode(mode), armed))
 

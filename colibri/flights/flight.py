@@ -1,10 +1,11 @@
 """One flight, stepped: a plant, an autopilot, and the wire between them."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar
 
 from colibri.autopilot.core.autopilot import Autopilot, Stages
 from colibri.autopilot.core.step import Received, Step, answer
+from colibri.common.records import Record
 from colibri.common.types import Address, PerRotor
 from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
@@ -42,7 +43,7 @@ class Wire(Protocol):
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered: ...
 
 
-class FrameSample(NamedTuple):
+class FrameSample(Record, frozen=True):
     """A frame that was flown; `world` is at the time of the next one."""
 
     step: Step
@@ -172,9 +173,9 @@ class InMemory:
         self._uncounted = 0
 
     def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
-        time_us, controls, armed = command
+        controls = command.controls
         if controls == self._controls[0]:  # repeated, as between two control samples
-            return ActuatorCommand(time_us, self._controls[1], armed)
+            return ActuatorCommand(command.time_us, self._controls[1], command.armed)
         received = command_as_received(command)
         assert received is not None, "a control law's command is one that rotors can follow"
         self._controls = (controls, received.controls)

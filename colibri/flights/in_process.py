@@ -42,13 +42,14 @@ def fly_locally(
         truth.write_world(plant.world)
         with gc_frozen():
             began_s = perf_counter()
-            for step, _, world, datagram, _ in SteppedFlight(plant, autopilot, wire).samples(plan.spec.duration):
-                log.write(step, datagram)
-                truth.write_world(world)
+            for sample in SteppedFlight(plant, autopilot, wire).samples(plan.spec.duration):
+                log.write(sample.step, sample.datagram)
+                truth.write_world(sample.world)
                 frames += 1
-                progress(world.time_us / 1e6)
+                time_s = sample.world.time_us / 1e6
+                progress(time_s)
                 if is_paced:
-                    sleep(max(0.0, began_s + world.time_us / 1e6 / pace - perf_counter()))
+                    sleep(max(0.0, began_s + time_s / pace - perf_counter()))
             log.flush()
             wall_time_s = perf_counter() - began_s
     finally:

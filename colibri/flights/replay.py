@@ -198,7 +198,7 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
             continue
         frame = received.frame
         try:
-            step = autopilot.step(*received)
+            step = autopilot.step(frame, received.plant_status)
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         if isinstance(frame, StateFrame):

@@ -40,7 +40,8 @@ class StateAssembler:
             state = self._of_attitude(name, fields, now_us)
         if state is None:
             return None
-        if not all(map(isfinite, (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state[4]))):
+        motion = (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s)
+        if not all(map(isfinite, motion)):
             self.refused += 1
             return None
         if state.time_us <= self._last_us and self._last_us - state.time_us < _ODOMETRY_STAYS_US:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from struct import Struct
 from typing import NamedTuple
 
+from colibri.common.records import Record
+
 _HEAD = Struct("<QIBH")  # simulated time in µs, custom mode, whether armed, number of parcels
 _PARCEL = Struct("<HH")  # station, length
 _PIECE = Struct("<QBB")  # simulated time in µs, number of the piece, their count
@@ -18,7 +20,7 @@ class Parcel(NamedTuple):
     datagram: bytes
 
 
-class StepMessage(NamedTuple):
+class StepMessage(Record, frozen=True):
     """All datagrams of one time in one direction; mode and arming from the vehicle."""
 
     time_us: int
@@ -29,8 +31,8 @@ class StepMessage(NamedTuple):
 
 def packets(step_message: StepMessage) -> list[bytes]:
     """Return a step message as at most 255 packets; raise `ValueError` if it needs more."""
-    time_us, parcels, custom_mode, armed = step_message
-    content = _HEAD.pack(time_us, custom_mode, armed, len(parcels))
+    time_us, parcels = step_message.time_us, step_message.parcels
+    content = _HEAD.pack(time_us, step_message.custom_mode, step_message.armed, len(parcels))
     for station, whole in parcels:
         datagram = whole[:MAX_PARCEL_BYTES]
         content += _PARCEL.pack(station, len(datagram)) + datagram

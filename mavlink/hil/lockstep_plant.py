@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import NamedTuple
 
+from colibri.common.records import Record
 from colibri.common.types import Address
 from colibri.mavlink.hil import lockstep, plant_status, state
 from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
@@ -19,7 +19,7 @@ from colibri.mavlink.wire.dialect import Codec, Message
 _WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD, PACE})
 
 
-class PlantDatagram(NamedTuple):
+class PlantDatagram(Record, frozen=True):
     frames: tuple[bytes, ...]
     address: Address
 

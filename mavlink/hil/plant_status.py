@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import nan
 from typing import NamedTuple
 
+from colibri.common.records import Record
 from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
@@ -15,7 +16,7 @@ _DELAY = "cmd_delay"
 _MAX_I32 = 2**31 - 1
 
 
-class PlantBattery(NamedTuple):
+class PlantBattery(Record, frozen=True):
     voltage_v: float  # nan without a battery
     current_a: float
     used_ah: float  # since full
@@ -35,7 +36,7 @@ class FaultResult(NamedTuple):
     result: int
 
 
-class PlantStatus(NamedTuple):
+class PlantStatus(Record, frozen=True):
     battery: PlantBattery | None = None
     results: tuple[FaultResult, ...] = ()  # of faults in the previous answer
     delay_us: int | None = None  # from the last command's frame to its effect, if any
@@ -44,7 +45,7 @@ class PlantStatus(NamedTuple):
 NOTHING = PlantStatus()
 
 
-class ReceivedFrame(NamedTuple):
+class ReceivedFrame(Record, frozen=True):
     frame: Frame
     plant_status: PlantStatus = NOTHING
 

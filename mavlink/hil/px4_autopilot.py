@@ -10,6 +10,8 @@ new.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import msgspec
+
 from colibri.common.types import PerRotor
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep import AnsweringEnd
@@ -49,7 +51,7 @@ class FlierEnd(AnsweringEnd):
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed
         controls = self._to_motors(command.controls)
-        moved = command._replace(time_us=command.time_us + self._zero_us, controls=controls)
+        moved = msgspec.structs.replace(command, time_us=command.time_us + self._zero_us, controls=controls)
         self._answer = encode_actuators(self._codec, moved)
         self._outbox.append(self._answer)
 

@@ -19,9 +19,9 @@ _turned = compiled(ned.ned_frd_from_enu_flu)
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
     """Return the frame as rounded by `encode_state` and `read_state`."""
-    time_us, position, velocity, attitude, rate = frame
-    is_valid, (position, velocity, attitude, rate) = _rounded(position, velocity, attitude, rate)
-    return StateFrame(time_us - time_us % 1000, position, velocity, attitude, rate) if is_valid else None
+    time_us = frame.time_us - frame.time_us % 1000
+    is_valid, motion = _rounded(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, frame.rate_flu_rad_s)
+    return StateFrame(time_us, *motion) if is_valid else None
 
 
 @compiled

@@ -4,8 +4,9 @@ from array import array
 from collections.abc import Sequence
 from functools import cache
 from math import isfinite, sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
+from colibri.common.records import Record
 from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
@@ -29,7 +30,7 @@ def actuator_frame(rotors: int) -> FixedFrame:
     return FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{rotors}] mode")
 
 
-class StateFrame(NamedTuple):
+class StateFrame(Record, frozen=True):
     """The vehicle's state at one instant of simulated time."""
 
     time_us: int  # whole milliseconds on the wire
@@ -39,7 +40,7 @@ class StateFrame(NamedTuple):
     rate_flu_rad_s: Vector
 
 
-class ActuatorCommand(NamedTuple):
+class ActuatorCommand(Record, frozen=True):
     """Rotor speeds in answer to the frame of `time_us`, 0..1 of the maximum."""
 
     time_us: int
@@ -48,9 +49,9 @@ class ActuatorCommand(NamedTuple):
 
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
-    time_us, (x, y, z), (vx, vy, vz), attitude, (p, q, r) = frame
-    time_ms = time_us // 1000
-    turning = _ATTITUDE.encode(codec, (time_ms, *ned_frd_from_enu_flu(attitude), p, -q, -r))
+    (x, y, z), (vx, vy, vz), (p, q, r) = frame.position_enu_m, frame.velocity_enu_m_s, frame.rate_flu_rad_s
+    time_ms = frame.time_us // 1000
+    turning = _ATTITUDE.encode(codec, (time_ms, *ned_frd_from_enu_flu(frame.attitude), p, -q, -r))
     return [turning, _POSITION.encode(codec, (time_ms, y, x, -z, vy, vx, -vz))]
 
 
@@ -88,16 +89,13 @@ def _frame(time_us: int, numbers: Sequence[float]) -> StateFrame | None:
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
-    time_us, controls, armed = command
-    return actuator_frame(len(controls)).encode(
-        codec, (time_us, LOCKSTEP_FLAG, *controls, _ARMED if armed else _DISARMED)
-    )
+    controls, mode = command.controls, _ARMED if command.armed else _DISARMED
+    return actuator_frame(len(controls)).encode(codec, (command.time_us, LOCKSTEP_FLAG, *controls, mode))
 
 
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     """Return the command as rounded by `encode_actuators` and `read_actuators`."""
-    time_us, controls, armed = command
-    return _within_range(time_us, tuple(array("f", controls)), armed)
+    return _within_range(command.time_us, tuple(array("f", command.controls)), command.armed)
 
 
 def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> list[ActuatorCommand]:

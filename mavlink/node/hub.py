@@ -2,8 +2,9 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
+from colibri.common.records import Record
 from colibri.common.types import Address
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.channel import Channel
@@ -31,7 +32,7 @@ KEY_REFUSED = (
 )
 
 
-class Outgoing(NamedTuple):
+class Outgoing(Record, frozen=True):
     """A datagram and its link's number; without address, the link chooses."""
 
     link: int

@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
+from colibri.common.records import Record
 from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
@@ -20,7 +21,7 @@ class HomePosition(NamedTuple):
     yaw_rad: float  # counter-clockwise from east
 
 
-class BatteryState(NamedTuple):
+class BatteryState(Record, frozen=True):
     cells: int
     voltage_v: float
     current_a: float

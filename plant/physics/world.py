@@ -1,13 +1,13 @@
 """The world: vehicle, rotors, battery and time, advanced one frame at a time."""
 
 from math import isfinite, nan
-from typing import NamedTuple
 
 import numpy as np
 
 from colibri.common.compiled_rotations import earth_from_body
 from colibri.common.jit import packed
 from colibri.common.matrices import inverse
+from colibri.common.records import Record
 from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
@@ -26,7 +26,7 @@ _MOMENT_S = 1e-3
 _RIGID = len(STATE)
 
 
-class World(NamedTuple):
+class World(Record, frozen=True):
     """The complete state of the simulation."""
 
     time_us: int

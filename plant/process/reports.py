@@ -92,9 +92,8 @@ class TruthLog:
             self._blocks = TruthBlocks(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count)
 
     def write_world(self, world: World) -> None:
-        time_us, state, rotors, charge_ah, voltage_v, wind, _ = world
-        speeds, others = split(rotors)
-        row = (time_us, *state, *speeds, voltage_v, charge_ah, *wind)
+        time_us, (speeds, others) = world.time_us, split(world.rotor_speeds)
+        row = (time_us, *world.state, *speeds, world.voltage_v, world.charge_used_ah, *world.wind_enu_m_s)
         self._log.add(TRUTH, row)
         if others:
             self._log.add(MORE_TRUTH, (time_us, *others))

@@ -56,9 +56,10 @@ def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     autopilot, plant = put_together(replace(plan, start=start), lambda: 0.0)
     states, fallback = [], []
     with gc_frozen():
-        for step, _, world, *_ in SteppedFlight(plant, autopilot, Direct()).samples(duration_s):
-            states.append((world.time_us * 1e-6, *world.state))
-            fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)
+        for sample in SteppedFlight(plant, autopilot, Direct()).samples(duration_s):
+            states.append((sample.world.time_us * 1e-6, *sample.world.state))
+            decision = sample.step.decision
+            fallback.append(decision is not None and decision.diagnostics.fallback is not None)
     return _flown(plan, np.array(states), np.array(fallback))
 
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from math import ceil, nan, radians
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from colibri.autopilot.control.interface import (
     AT_REST,
@@ -43,6 +44,7 @@ from colibri.common.config import Degrees, Negative, Positive, Table, read_setti
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import opened, packed
 from colibri.common.matrices import dot, matvec, norm
+from colibri.common.records import Record
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
@@ -87,7 +89,7 @@ class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     fallback: FallbackSettings
 
 
-class LawMemory(NamedTuple):
+class LawMemory(Record, frozen=True):
     """State of the law between two control samples."""
 
     tracked: Tracked
@@ -168,13 +170,13 @@ class LpvMpc(AttitudeController[LawMemory]):
         return memory.tracked.charge_ah
 
     def with_charge(self, memory: LawMemory, charge_ah: float) -> LawMemory:
-        return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
+        return replace(memory, tracked=replace(memory.tracked, charge_ah=charge_ah))
 
     def mass_kg(self, memory: LawMemory) -> float:
         return memory.tracked.mass_kg
 
     def with_mass(self, memory: LawMemory, mass_kg: float) -> LawMemory:
-        return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))
+        return replace(memory, tracked=replace(memory.tracked, mass_kg=mass_kg))
 
     def lag_us(self, memory: LawMemory) -> int:
         return memory.lag_us
@@ -184,7 +186,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
 
     def with_lag(self, memory: LawMemory, lag_us: int) -> LawMemory:
-        return memory._replace(lag_us=lag_us)
+        return replace(memory, lag_us=lag_us)
 
     def step(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
@@ -226,14 +228,15 @@ class LpvMpc(AttitudeController[LawMemory]):
 
     def _inputs(self, memory: LawMemory, state: VehicleState) -> tuple[VehicleState, tuple[Any, ...]]:
         """Return the state in the level frame, and the arguments of `planning.begin`."""
-        (rotors, before, estimate, charge_ah, mass_kg), plan, age, _, _ = memory
+        tracked, plan = memory.tracked, memory.plan
         if self._to_body is not None:
             state = seen_level(state, self._to_body)
         position, velocity, attitude, _, rate, _, _, airborne = state
         return state, (
-            position, velocity, attitude, rate, rotors, before, estimate, mass_kg, charge_ah, airborne,
-            _UNKNOWN if plan is None else plan.states, age, self.tracker.model, self.tracker.battery.numbers,
-            self._now, self._mpc.model, np.empty(MEASURED), np.empty(estimate.size),
+            position, velocity, attitude, rate, tracked.rotors, tracked.measured, tracked.estimate, tracked.mass_kg,
+            tracked.charge_ah, airborne, _UNKNOWN if plan is None else plan.states, memory.age, self.tracker.model,
+            self.tracker.battery.numbers, self._now, self._mpc.model, np.empty(MEASURED),
+            np.empty(tracked.estimate.size),
         )  # fmt: skip
 
     def _opened_now(self) -> Now:
@@ -243,9 +246,9 @@ class LpvMpc(AttitudeController[LawMemory]):
         self, memory: LawMemory, seen: _Seen, wanted: Wanted, qps: Qps, *, condensed: bool = False
     ) -> tuple[LawMemory, Decision]:
         """Decide by a plan, or without one by a fallback; the QP is `condensed` unless recovery may be needed."""
-        (state, tracked, max_speed), (target, aim, path, deviation) = seen, wanted
-        _, before, age, lag_us, _ = memory
-        along_n, force_n, phi, theta, psi = aim
+        (state, tracked, max_speed), path = seen, wanted.path
+        before, age, lag_us = memory.plan, memory.age, memory.lag_us
+        along_n, force_n, phi, theta, psi = wanted.aim
         yaw, mass_kg, path_lag_s = state.euler[2], tracked.mass_kg, lag_us * 1e-6 if path else nan
         plan: Plan | None = None
         turned_away = along_n < RECOVER_BEYOND * force_n
@@ -255,7 +258,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         else:
             if turned_away or not condensed:
                 last = before.commands[age:] if before else _UNKNOWN
-                self._mpc.condense(qps, self._now, target, last, along_n, state.airborne, path)
+                self._mpc.condense(qps, self._now, wanted.target, last, along_n, state.airborne, path)
             plan, how = self._mpc.plan(qps, yaw, path, mass_kg, path_lag_s)
         if plan is not None:
             squared, age = plan.commands[0], 1
@@ -266,7 +269,7 @@ class LpvMpc(AttitudeController[LawMemory]):
             squared, age, how = self._recover(tracked.measured), 0, how._replace(fallback=Fallback.RECOVERY)
         commands, tracked = self.tracker.actuate(tracked, squared, max_speed)
         lag_us = self._lag_us(lag_us, plan, age) if path else 0
-        memory = LawMemory(tracked, plan, age, lag_us, deviation)
+        memory = LawMemory(tracked, plan, age, lag_us, wanted.deviation)
         return memory, Decision(commands, (phi, theta, nearest_turn(psi, yaw)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:

@@ -20,6 +20,7 @@ from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import matmul
+from colibri.common.records import Record
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
 
@@ -57,7 +58,7 @@ class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     slack_weight: Positive
 
 
-class Plan(NamedTuple):
+class Plan(Record, frozen=True):
     """A solved QP."""
 
     commands: Array  # squared speeds at each step, (N, m)

@@ -1,7 +1,5 @@
 """From references, or a demanded attitude, to the target of a plan."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
@@ -15,12 +13,13 @@ from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSett
 from colibri.autopilot.control.lpv_mpc.planning import Now
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import dot, norm
+from colibri.common.records import Record
 from colibri.common.types import Array
 
 _STILL_M_S = 1e-3
 
 
-class Wanted(NamedTuple):
+class Wanted(Record, frozen=True):
     """The target of a plan."""
 
     target: Packed  # the `PlanReferences`

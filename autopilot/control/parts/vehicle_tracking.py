@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
@@ -18,13 +19,14 @@ from colibri.autopilot.control.vehicle_model.rotor_lag import RotorModel
 from colibri.common.elementary import square
 from colibri.common.jit import packed
 from colibri.common.matrices import matvec
+from colibri.common.records import Record
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _WRENCH = 4
 
 
-class Tracked(NamedTuple):
+class Tracked(Record, frozen=True):
     rotors: Array  # rows: commands, vehicle's unit; speeds, parts of the largest; wrench; its last mean; (4, m >= 4)
     measured: Array  # by the observer a sample ago, (9,); empty at first
     estimate: Array  # of the observer a sample ago, (12,)
@@ -60,7 +62,6 @@ class VehicleTracker:
 
     def actuate(self, tracked: Tracked, squared: Array, max_speed: float) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state; `max_speed` in parts of the largest."""
-        before, measured, estimate, charge_ah, mass_kg = tracked
         rotors = np.empty(self._actuated)
-        rotor_lag.actuate(before, squared, max_speed, self._rotors, rotors)
-        return rotors[0, : squared.size], Tracked(rotors, measured, estimate, charge_ah, mass_kg)
+        rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
+        return rotors[0, : squared.size], replace(tracked, rotors=rotors)

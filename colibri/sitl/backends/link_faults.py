@@ -5,9 +5,10 @@ from heapq import heappop, heappush
 from math import inf
 from random import Random
 from time import perf_counter, sleep
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from colibri.common.errors import unknown
+from colibri.common.records import Record
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.wire.dialect import CRC_BYTES, HEADER_BYTES, TRUTH_COMPONENT, mav
@@ -134,7 +135,7 @@ class SessionError(SitlError):
     """A flight cannot go on: a process has died or is silent."""
 
 
-class Instant(NamedTuple):
+class Instant(Record, frozen=True):
     """A frame that was flown; `began` is the true state at its start."""
 
     began: StateFrame
