@@ -1,7 +1,7 @@
 """The first task of each mode, and its continuation after a restart."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from colibri.autopilot.commander.missions import Missions, MissionTask, task_of
 from colibri.autopilot.commander.rules.modes import Mode
@@ -30,6 +30,7 @@ from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.records import Record
 from colibri.mavlink.node.budget import Budget
 from colibri.plant.vehicle.description import Vehicle
 
@@ -38,7 +39,7 @@ TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 """First task of a mode."""
 
 
-class TaskRecord(NamedTuple):
+class TaskRecord(Record, frozen=True):
     """State of a task for the checkpoint; `legs` are those that remain."""
 
     order: OrderRecord | None = None

@@ -38,11 +38,11 @@ class ModeNeeds:
 
     def missing(self) -> dict[Need, str]:
         """Return the unmet needs, each with its reason."""
-        sticks, setpoint, *_ = self.steered(self._now_us)
+        steered = self.steered(self._now_us)
         met = {
             Need.ATTITUDE_CONTROL: self._takes_attitude,
-            Need.STICKS: sticks is not None,
-            Need.SETPOINTS: setpoint is not None,
+            Need.STICKS: steered.sticks is not None,
+            Need.SETPOINTS: steered.setpoint is not None,
             Need.MISSION: self._missions.total > 0,
             Need.CHECKED: not self._missions.checking,
             Need.CIRCLE: False,

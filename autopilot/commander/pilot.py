@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from colibri.autopilot.commander.flight.ground_contact import GroundContact, GroundRecord
 from colibri.autopilot.commander.flight.readiness import Readiness
@@ -30,6 +30,7 @@ from colibri.autopilot.guidance.tasks.task import (
     TaskOutput,
     lifts,
 )
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import Refusal
@@ -56,7 +57,7 @@ _TEXTS = {
 _IMPACT = "Disarmed by impact"
 
 
-class Sensed(NamedTuple):
+class Sensed(Record, frozen=True):
     """Inputs of a control sample; references are for `delay_us` later, when commands take effect.
 
     Attributes:
@@ -77,7 +78,7 @@ class Sensed(NamedTuple):
     drifts: bool = False  # the speed is not measured
 
 
-class PilotRecord(NamedTuple):
+class PilotRecord(Record, frozen=True):
     """Attributes of `Pilot` and its parts for a restart, without the task."""
 
     state: State
@@ -185,7 +186,7 @@ class Pilot:
         self.ground.drifts = sensed.drifts
 
     def context(self) -> TaskContext:
-        now_us, vehicle, steered, position_known, delay_us, *_ = self.sensed
+        sensed, vehicle = self.sensed, self.sensed.vehicle
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"
@@ -194,17 +195,17 @@ class Pilot:
         if speed != behaviour.limits.speed_m_s:
             behaviour = at_speed(behaviour, speed)
         return TaskContext(
-            now_us + delay_us - self.lag_us,
+            sensed.now_us + sensed.delay_us - self.lag_us,
             vehicle,
             reference,
             self.home.position_enu_m,
             behaviour,
             self.generator.interval_s,
             self.generator.samples,
-            steered,
+            sensed.steered,
             self.ground.standing,
             self.ground.height_m,
-            blind=self.saving is Action.DESCEND or not position_known,
+            blind=self.saving is Action.DESCEND or not sensed.position_known,
             home_yaw_rad=self.home.armed_yaw_rad,
         )
 
@@ -228,8 +229,8 @@ class Pilot:
         # position has a check of its own, which force skips
         refusal = self._follow(Event.ARM, "Armed", missing=_without(Need.POSITION, missing))
         if refusal is None:
-            now_us, vehicle, *_ = self.sensed
-            self.ground.arm(now_us)
+            vehicle = self.sensed.vehicle
+            self.ground.arm(self.sensed.now_us)
             self.terminated = False
             if vehicle is not None:
                 self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
@@ -334,10 +335,10 @@ class Pilot:
         )
 
     def _rest(self) -> Guidance:
-        now_us, vehicle, *_ = self.sensed
+        vehicle = self.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.generator.rest(vehicle)
-        self.ground.rest(now_us, vehicle)
+        self.ground.rest(self.sensed.now_us, vehicle)
         return RESTS
 
     def _idle(self) -> Guidance:

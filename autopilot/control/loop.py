@@ -38,6 +38,7 @@ from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.config import SettingsError
 from colibri.common.errors import Error
+from colibri.common.records import Record
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array, PerRotor, Vector
@@ -57,7 +58,7 @@ _ON_SENSORS_S = 0.02  # the estimator does not start with frames further apart t
 _UNSEEN = Seen(-1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-class LoopRecord(NamedTuple):
+class LoopRecord(Record, frozen=True):
     """State of a control loop to resume after a restart, as plain data."""
 
     yaw_rad: float  # unwrapped

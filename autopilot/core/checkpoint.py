@@ -20,6 +20,7 @@ from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.mission.executor import MissionRecord
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.common.earth.geodesy import Geodetic
+from colibri.common.records import Record
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.mission.items import MissionItem
@@ -30,7 +31,7 @@ FOLLOWS_US = 30_000_000  # a frame that comes later is of another flight
 Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE
 
 
-class Checkpoint(NamedTuple):
+class Checkpoint(Record, frozen=True):
     """A flight at one control sample."""
 
     fingerprint: int  # hash of profile and vehicle: the memory of another law is not restored

@@ -52,7 +52,7 @@ class VehicleTrial:
         preview = self._planned_at.preview
         ahead = still_target((1.0, 1.0, 1.0), 1.0, preview.samples)
         horizon, reference = lead(at_rest(AT_REST), ahead, flies_by.limits, preview.interval_us * 1e-6)
-        if not all(np.isfinite(column).all() for column in (*horizon, *reference)):
+        if not all(np.isfinite(column).all() for column in (*horizon, reference.motion, reference.heading)):
             raise TrialError("no reference can be led within these limits")
         if self._loop.takes_attitude:
             AttitudeReference(self._loop.vehicle, self._loop.preview, attitude_limits(flies_by))

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.estimation.sensing.rejection import RejectedSource, Rejections
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import mav
@@ -94,7 +95,7 @@ class FilterCheck(NamedTuple):
     accepted: tuple[int, ...]
 
 
-class Estimate(NamedTuple):
+class Estimate(Record, frozen=True):
     """The vehicle at one instant; rates without bias, biases FLU (of a modelled force ENU), standard deviations ENU."""
 
     frame: StateFrame

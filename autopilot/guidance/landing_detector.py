@@ -90,7 +90,7 @@ class Lack(NamedTuple):
         return self.lack_s >= (_UNCARRIED_S if moves else _UNCARRIED_STILL_S)
 
 
-class Held(NamedTuple):
+class Held(Record, frozen=True):
     """Start of a time without change of height though the reference is far below, and the height."""
 
     since_us: int | None = None
@@ -107,7 +107,7 @@ class Held(NamedTuple):
         return self.since_us is not None and now_us - self.since_us >= _HELD_US
 
 
-class Scrape(NamedTuple):
+class Scrape(Record, frozen=True):
     """Start of a fast motion along the ground, without a knock, though the vehicle should be well above."""
 
     since_us: int | None = None
@@ -122,7 +122,7 @@ class Scrape(NamedTuple):
         return self.since_us is not None and now_us - self.since_us >= _SCRAPES_US
 
 
-class Motion(NamedTuple):
+class Motion(Record, frozen=True):
     time_us: int
     velocity_enu_m_s: Vector
 

@@ -11,6 +11,7 @@ import numpy as np
 from colibri.autopilot.control.interface import Horizon, VehicleState
 from colibri.autopilot.guidance import integrator_chain
 from colibri.autopilot.guidance.integrator_chain import Integers, Limits
+from colibri.common.records import Record
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
@@ -28,7 +29,7 @@ Kinds: TypeAlias = tuple[BindingDerivative, BindingDerivative, BindingDerivative
 ALL_BOUND: Kinds = (BindingDerivative.POSITION, BindingDerivative.POSITION, BindingDerivative.POSITION)
 
 
-class Reference(NamedTuple):
+class Reference(Record, frozen=True):
     """State of the chain: position to jerk, ENU, (4, 3); yaw, unwrapped, and rate, (2,)."""
 
     motion: Array

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVarTuple
 
-from msgspec.structs import replace
-
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.process.logs import AutopilotLog
@@ -101,7 +99,7 @@ class PlantClient:
         while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
             ahead_us.append(time_us)
             time_us += interval_us
-        end.answer(step.command, step.faults, [replace(step.command, time_us=time_us) for time_us in ahead_us])
+        end.answer(step.command, step.faults, [step.command._replace(time_us=time_us) for time_us in ahead_us])
         return step, ahead_us
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:

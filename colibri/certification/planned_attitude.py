@@ -9,7 +9,6 @@ from math import exp, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
@@ -139,7 +138,7 @@ class PlannedAttitude:
             states = np.zeros((self._horizon + 1, PREDICTED + len(self._from_wrench)))
             states[:, PREDICTED:] = self._squared(thrust_n, 0.0 * z[_COMMANDS])
             plan = Plan(np.tile(steady, (self._horizon, 1)), states)
-        tracked = replace(law.initial(0.0).tracked, charge_ah=self._charge_ah)
+        tracked = law.initial(0.0).tracked._replace(charge_ah=self._charge_ah)
         tracked.rotors[1] = np.sqrt(self._squared(thrust_n, z[_MOMENTS]))
         half = 0.5 * z[ANGLES]
         attitude = quaternion_product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from msgspec import structs
-from msgspec.structs import replace
 from numpy.random import Generator
 
 from colibri.autopilot.commander.rules.modes import Mode
@@ -164,7 +163,7 @@ class PilotedEpisodes(Episodes):
         if self._throws:
             x = begun.x.tolist()
             place = plant.world.state[6:9]
-            plant.world = replace(plant.world, state=(*x[:6], *place, *x[9:13]))
+            plant.world = plant.world._replace(state=(*x[:6], *place, *x[9:13]))
         self._move(begun.x[6:9] - self._first[:3])
         self._last[n] = 0.0
         self._look()

@@ -10,8 +10,6 @@ new.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import msgspec
-
 from colibri.common.types import PerRotor
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep import AnsweringEnd
@@ -51,7 +49,7 @@ class FlierEnd(AnsweringEnd):
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed
         controls = self._to_motors(command.controls)
-        moved = msgspec.structs.replace(command, time_us=command.time_us + self._zero_us, controls=controls)
+        moved = command._replace(time_us=command.time_us + self._zero_us, controls=controls)
         self._answer = encode_actuators(self._codec, moved)
         self._outbox.append(self._answer)
 
@@ -77,4 +75,5 @@ class FlierEnd(AnsweringEnd):
         time_us = frame.time_us - self._zero_us
         fix, self._fix = self._fix, None
         gps = None if fix is None else replace(fix, time_us=time_us)
-        return frame._replace(time_us=time_us, updated=frame.updated & _EVERYTHING or _EVERYTHING, gps=gps)
+        updated = frame.updated & _EVERYTHING or _EVERYTHING
+        return frame._replace(time_us=time_us, updated=updated, gps=gps)

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.kernels import atan2
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
@@ -69,7 +70,7 @@ class Distance(NamedTuple):
     field_of_view_rad: float  # of its beam's cone
 
 
-class SensorFrame(NamedTuple):
+class SensorFrame(Record, frozen=True):
     """On-board measurements at one instant; groups that are not `updated` are old or zero."""
 
     time_us: int
@@ -100,12 +101,14 @@ Frame: TypeAlias = StateFrame | SensorFrame  # a frame from plant to autopilot a
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    time_us, updated, (fx, fy, fz), (p, q, r), (mx, my, mz), pressure_pa, temperature_c, gps, distance = frame
+    (fx, fy, fz), (p, q, r) = frame.specific_force_flu_m_s2, frame.rate_flu_rad_s
+    (mx, my, mz), pressure_pa = frame.magnetic_field_flu_gauss, frame.pressure_pa
     pressure = (pressure_pa / 100.0, 0.0, _altitude_m(pressure_pa))
-    numbers = (time_us, fx, -fy, -fz, p, -q, -r, mx, -my, -mz, *pressure, temperature_c)
+    numbers = (frame.time_us, fx, -fy, -fz, p, -q, -r, mx, -my, -mz, *pressure, frame.temperature_c)
+    updated = frame.updated
     layout = _SHORTENED[updated > 0xFF] if updated <= 0xFFFF else _SENSOR
     messages = [layout.encode(codec, (*numbers, updated))]
-    if gps is None and distance is None:
+    if frame.gps is None and frame.distance is None:
         return messages
     for row in OWN_MESSAGES:
         value = getattr(frame, row.field)
@@ -116,13 +119,13 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
 
 def sensors_as_received(frame: SensorFrame) -> SensorFrame | None:
     """Return a frame of HIL_SENSOR alone as rounded by its message; None for others."""
-    time_us, updated, force, rate, field, pressure_pa, temperature_c, gps, distance = frame
-    if gps is not None or distance is not None:
+    if frame.gps is not None or frame.distance is not None:
         return None
+    vectors = (*frame.specific_force_flu_m_s2, *frame.rate_flu_rad_s, *frame.magnetic_field_flu_gauss)
     fx, fy, fz, p, q, r, mx, my, mz, hpa, temperature_c = _SINGLES.unpack(
-        _SINGLES.pack(*force, *rate, *field, pressure_pa / 100.0, temperature_c)
+        _SINGLES.pack(*vectors, frame.pressure_pa / 100.0, frame.temperature_c)
     )
-    return SensorFrame(time_us, updated, (fx, fy, fz), (p, q, r), (mx, my, mz), hpa * 100.0, temperature_c)
+    return SensorFrame(frame.time_us, frame.updated, (fx, fy, fz), (p, q, r), (mx, my, mz), hpa * 100.0, temperature_c)
 
 
 def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.common.kernels import cos, sin
+from colibri.common.records import Record
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.node.service import Peer
@@ -67,7 +68,7 @@ LOCAL_FRAMES: dict[int, Frame] = {
 }
 
 
-class Whereabouts(NamedTuple):
+class Whereabouts(Record, frozen=True):
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0
     origin: Geodetic = DEFAULT_ORIGIN

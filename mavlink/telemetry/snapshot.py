@@ -16,7 +16,7 @@ LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 CHARGE_OK = 1  # MAV_BATTERY_CHARGE_STATE_OK
 
 
-class HomePosition(NamedTuple):
+class HomePosition(Record, frozen=True):
     position_enu_m: Vector
     yaw_rad: float  # counter-clockwise from east
 
@@ -32,7 +32,7 @@ class BatteryState(Record, frozen=True):
     charge_state: int = CHARGE_OK  # MAV_BATTERY_CHARGE_STATE
 
 
-class Setpoint(NamedTuple):
+class Setpoint(Record, frozen=True):
     """The control law's setpoint; nan if not given."""
 
     position_enu_m: Vector = NOWHERE
@@ -56,7 +56,7 @@ class Forecast(NamedTuple):
     yaw_rate_rad_s: float
 
 
-class SolverState(NamedTuple):
+class SolverState(Record, frozen=True):
     status: int = -1  # `QpStatus`, 0 is solved; -1 without a QP
     fallback: int = -1  # `Fallback`; -1 without
     iterations: int = -1  # -1 if not reported
@@ -87,7 +87,7 @@ NOT_SOLVED = SolverState()
 _PLUS = ((0.0, -0.5, 0.0, 0.5), (0.5, 0.0, -0.5, 0.0), (0.5, -0.5, 0.5, -0.5))
 
 
-class TelemetrySnapshot(NamedTuple):
+class TelemetrySnapshot(Record, frozen=True):
     time_us: int  # simulated, since the autopilot's start
     armed: bool = False
     base_mode: int = 0  # MAV_MODE_FLAG bits except the armed one

@@ -1,11 +1,10 @@
 """The vehicle as PX4's topics: control samples, sensor measurements and estimates, status with PX4's mode numbers."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.jit import compiled
+from colibri.common.records import Record
 from colibri.common.types import Array
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.telemetry.snapshot import EstimatorState
@@ -147,7 +146,7 @@ _NAV_STATES = {
 """PX4's main mode and sub mode -> its nav_state; 23, EXTERNAL1, flies a track."""
 
 
-class VehicleStatus(NamedTuple):
+class VehicleStatus(Record, frozen=True):
     armed: bool
     custom_mode: int  # in PX4's layout
     failsafe: bool = False

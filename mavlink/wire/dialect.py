@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import development
 
+from colibri.common.records import Record
 from colibri.mavlink.wire import missing_messages
 
 missing_messages.add_to(development)
@@ -72,7 +73,7 @@ class Refusal(NamedTuple):
     result: int = RESULT_DENIED  # MAV_RESULT
 
 
-class Message(NamedTuple):
+class Message(Record, frozen=True):
     """A decoded message with a valid CRC; its values are unchecked."""
 
     name: str

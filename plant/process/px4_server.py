@@ -4,8 +4,6 @@ from math import hypot
 from time import perf_counter, sleep
 from typing import Any
 
-from msgspec.structs import replace
-
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
@@ -82,7 +80,7 @@ class Simulator:
     def _fly(self) -> bool:
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
-        world = replace(self._start, time_us=self._interval_us)  # PX4's clock has no use for 0
+        world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
         pace, progress, frames = FramePacer(self._speed, began_s), Progress(self._status), 0
         silence = Silence(self._status, SILENT_AFTER_S, "PX4 answers again", began_s)
         while not self._stop and self._end.peer is not None and self._end.calls == call:

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from msgspec.structs import astuple
+
 from colibri.common.earth.atmosphere import temperature_c
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
@@ -14,7 +16,7 @@ from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.description import Vehicle
 from colibri.plant.vehicle.sensors import Sensors
 
-_PLACE = {field: place for place, field in enumerate(SensorFrame._fields)}
+_PLACE = {field: place for place, field in enumerate(SensorFrame.__struct_fields__)}
 _TIME, _UPDATED, _TEMPERATURE = _PLACE["time_us"], _PLACE["updated"], _PLACE["temperature_c"]
 
 
@@ -44,7 +46,8 @@ class SensorSuite:
             if is_fitted(row, parts)
         ]
         nothing = (0.0, 0.0, 0.0)
-        self._reported: list[Any] = [*SensorFrame(0, 0, nothing, nothing, nothing, pressure_pa=0.0, temperature_c=0.0)]
+        first = SensorFrame(0, 0, nothing, nothing, nothing, pressure_pa=0.0, temperature_c=0.0)
+        self._reported: list[Any] = [*astuple(first)]
         self._frame: SensorFrame | None = None
 
     def reseed(self, seed: int) -> None:
@@ -70,4 +73,4 @@ class SensorSuite:
                 reported[place] = None
         reported[_TIME], reported[_UPDATED] = world.time_us, updated
         reported[_TEMPERATURE] = temperature_c(self._origin.altitude_m + world.state[8])
-        return SensorFrame._make(reported)
+        return SensorFrame(*reported)

@@ -4,8 +4,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
-from msgspec.structs import replace
-
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, judged
 from colibri.mavlink.hil.feedback import Feedback
@@ -60,7 +58,7 @@ class Faults:
         after_ah = used_ah if fault.kind == OK else max(used_ah, (1.0 - left) * self._battery.capacity_ah)
         self._taken_ah = after_ah - used_ah
         self._physics.resist(resistance)
-        return replace(world, charge_used_ah=after_ah)
+        return world._replace(charge_used_ah=after_ah)
 
 
 _NEVER_US = 1 << 62

@@ -96,7 +96,8 @@ class Cockpit:
             self.pilot.sense(Sensed(self.now_us, self.state, self.steered, position_known))
             self.guidance = self.pilot.step()
             if self.guidance is not RESTS and self.pilot.generator.reference is not None:
-                motion, heading = self.pilot.generator.reference
+                reference = self.pilot.generator.reference
+                motion, heading = reference.motion, reference.heading
                 x, y, z = motion[0].tolist()
                 vx, vy, vz = motion[1].tolist()
                 on_ground = z < 0.0

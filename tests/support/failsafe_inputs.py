@@ -1,7 +1,5 @@
 """Inputs of the failsafes' conditions for a vehicle that is well."""
 
-from msgspec.structs import replace
-
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
@@ -33,9 +31,9 @@ WELL = FailsafeInputs(
 LOST: dict[Condition, FailsafeInputs] = {
     Condition.TILTED: WELL._replace(state=WELL.state._replace(euler=(1.5, 0.0, 0.0))),
     Condition.ROTOR_FAILED: WELL._replace(rotor_lost=0),
-    Condition.BATTERY_EMERGENCY: WELL._replace(battery=replace(FULL, remaining=0.01)),
-    Condition.BATTERY_CRITICAL: WELL._replace(battery=replace(FULL, remaining=0.06)),
-    Condition.BATTERY_LOW: WELL._replace(battery=replace(FULL, remaining=0.14)),
+    Condition.BATTERY_EMERGENCY: WELL._replace(battery=FULL._replace(remaining=0.01)),
+    Condition.BATTERY_CRITICAL: WELL._replace(battery=FULL._replace(remaining=0.06)),
+    Condition.BATTERY_LOW: WELL._replace(battery=FULL._replace(remaining=0.14)),
     Condition.PLAN_FAILED: WELL._replace(decided=Diagnostics(fallback=Fallback.LQR)),
     Condition.STATION_LOST: WELL._replace(station_us=0),
     Condition.FENCE_BREACHED: WELL._replace(fence=lambda _: -5.0),

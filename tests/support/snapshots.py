@@ -62,7 +62,7 @@ FLYING = TelemetrySnapshot(
 
 NOT_TOLD: dict[str, Any] = {"sensed": st.none(), "fix": st.none(), "latest": st.just({}), "estimator": st.none()}
 ARBITRARY = st.builds(
-    TelemetrySnapshot, **dict.fromkeys(set(TelemetrySnapshot._fields) - set(NOT_TOLD), ...), **NOT_TOLD
+    TelemetrySnapshot, **dict.fromkeys(set(TelemetrySnapshot.__struct_fields__) - set(NOT_TOLD), ...), **NOT_TOLD
 )
 
 

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import psutil
 from msgspec import structs
-from msgspec.structs import replace
 
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode, State, custom_mode, mode_of_custom
 from colibri.autopilot.control.profile import load_profile
@@ -102,7 +101,7 @@ class BareFlight(Stepped, Steered):
         return copter_autopilot(_PROFILE, self._vehicle, self._settings, lambda: 0.0, strict=True)
 
     def reset_world(self, start: Start) -> None:
-        self.plant.world = replace(starting_world(start, self._vehicle), time_us=self.time_us)
+        self.plant.world = starting_world(start, self._vehicle)._replace(time_us=self.time_us)
 
     def step(self) -> None:
         now_us = self.time_us

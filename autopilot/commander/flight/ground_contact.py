@@ -25,6 +25,7 @@ from colibri.autopilot.guidance.landing_detector import (
     knock,
     watch,
 )
+from colibri.common.records import Record
 from colibri.mavlink.services.statustext import CRITICAL, INFO, NOTICE
 
 
@@ -37,7 +38,7 @@ class FlightTimes(NamedTuple):
     flights: int = 0
 
 
-class GroundRecord(NamedTuple):
+class GroundRecord(Record, frozen=True):
     """Attributes of `GroundContact` for a restart."""
 
     standing: bool
@@ -77,9 +78,8 @@ class GroundContact:
 
     def resume(self, record: GroundRecord, *, came_down: bool) -> None:
         """Restore the state; a vehicle that `came_down` meanwhile stands."""
-        self.standing, self.idles, self.height_m, self.times = record
-        self.standing |= came_down
-        self.idles |= came_down
+        self.standing, self.idles = record.standing or came_down, record.idles or came_down
+        self.height_m, self.times = record.height_m, record.times
 
     def clear(self, vehicle: VehicleState) -> bool:
         return not self.standing and is_clear(self._landing, vehicle, self.height_m)

@@ -1,7 +1,5 @@
 """Moves the reference to a task's target, and previews it."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon, Pace, VehicleState
@@ -20,9 +18,10 @@ from colibri.autopilot.guidance.reference import (
 )
 from colibri.autopilot.guidance.tasks.task import PlannedMotion, PositionMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
+from colibri.common.records import Record
 
 
-class Led(NamedTuple):
+class Led(Record, frozen=True):
     """The last movement to a target, reused while the reference rests (`stays`)."""
 
     target: Target
@@ -92,7 +91,7 @@ class ReferenceGenerator:
         return self._instants.for_law(horizon)
 
     def _lead_to(self, reference: Reference, wanted: PositionMotion, *, waited: bool) -> Led:
-        before, (target, limits, _) = self._led, wanted
+        before, target, limits = self._led, wanted.target, wanted.limits
         if before is not None and not waited and before.is_again(reference, target, limits):
             return before
         horizon, after = lead(reference, target, limits, self.interval_s, waited=waited)

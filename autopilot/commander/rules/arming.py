@@ -1,9 +1,9 @@
 """The arming checks."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
+from colibri.common.records import Record
 from colibri.common.rotations import tilt_deg
 from colibri.mavlink.wire.dialect import Refusal
 
@@ -15,7 +15,7 @@ MAX_THRUST_STICK = 0.6
 _SURELY_LEVEL = 0.1  # x² + y² of a quaternion at 37 degrees of tilt, below which the slow arc cosine is skipped
 
 
-class ArmingInputs(NamedTuple):
+class ArmingInputs(Record, frozen=True):
     """Inputs of the arming checks; charge and stick are 0..1, texts are faults."""
 
     state: VehicleState | None

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Container, Mapping
 from math import hypot, radians, sqrt
-from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits
 from colibri.autopilot.commander.rules.failsafe_table import Condition
@@ -11,6 +10,7 @@ from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleSt
 from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.autopilot.guidance.integrator_chain import Limits as Pace
+from colibri.common.records import Record
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint
 from colibri.mavlink.telemetry.snapshot import BatteryState
@@ -22,7 +22,7 @@ _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
 """Fallbacks after an unsolved QP; recovery is one if a QP was tried."""
 
 
-class FailsafeInputs(NamedTuple):
+class FailsafeInputs(Record, frozen=True):
     """Inputs of the conditions; times are simulated, µs."""
 
     now_us: int
@@ -196,7 +196,7 @@ def _setpoints_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
 
 SILENT_SINCE: Mapping[Condition, Callable[[FailsafeInputs, bool], int | None]] = {
     Condition.TELEMETRY_MISSED: lambda inputs, _: inputs.missed_us,
-    Condition.GPS_LOST: lambda inputs, _: inputs.estimate and inputs.estimate.health.gps_lost_since_us,
+    Condition.GPS_LOST: lambda inputs, _: None if inputs.estimate is None else inputs.estimate.health.gps_lost_since_us,
     Condition.STATION_LOST: lambda inputs, _: inputs.station_us,
     Condition.STICKS_LOST: _sticks_silent_since,
     Condition.SETPOINTS_LOST: _setpoints_silent_since,

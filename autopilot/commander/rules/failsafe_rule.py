@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, FailsafeRow
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.common.records import Record
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
 CLEAR_AFTER_US = 1_000_000  # time until a condition is over, so that a flickering link is lost once
@@ -29,7 +30,7 @@ class FailsafeSetting(NamedTuple):
     action: Action
 
 
-class FlightState(NamedTuple):
+class FlightState(Record, frozen=True):
     """State of the flight; `saving` is the active failsafe."""
 
     armed: bool
@@ -43,7 +44,7 @@ class FlightState(NamedTuple):
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 
-class FailsafeMemory(NamedTuple):
+class FailsafeMemory(Record, frozen=True):
     """When each ongoing condition, past its delay, last held."""
 
     held_us: Mapping[Condition, int] = {}

@@ -6,7 +6,6 @@ from typing import Annotated, Any, TypeAlias
 
 import msgspec
 import numpy as np
-from msgspec.structs import replace
 
 from colibri.autopilot.control.interface import (
     AT_REST,
@@ -170,13 +169,13 @@ class LpvMpc(AttitudeController[LawMemory]):
         return memory.tracked.charge_ah
 
     def with_charge(self, memory: LawMemory, charge_ah: float) -> LawMemory:
-        return replace(memory, tracked=replace(memory.tracked, charge_ah=charge_ah))
+        return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
 
     def mass_kg(self, memory: LawMemory) -> float:
         return memory.tracked.mass_kg
 
     def with_mass(self, memory: LawMemory, mass_kg: float) -> LawMemory:
-        return replace(memory, tracked=replace(memory.tracked, mass_kg=mass_kg))
+        return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))
 
     def lag_us(self, memory: LawMemory) -> int:
         return memory.lag_us
@@ -186,7 +185,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
 
     def with_lag(self, memory: LawMemory, lag_us: int) -> LawMemory:
-        return replace(memory, lag_us=lag_us)
+        return memory._replace(lag_us=lag_us)
 
     def step(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
 
 from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
@@ -64,4 +63,4 @@ class VehicleTracker:
         """Return rotor commands, vehicle's unit, and the next tracker state; `max_speed` in parts of the largest."""
         rotors = np.empty(self._actuated)
         rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
-        return rotors[0, : squared.size], replace(tracked, rotors=rotors)
+        return rotors[0, : squared.size], tracked._replace(rotors=rotors)

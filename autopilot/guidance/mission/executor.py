@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 from colibri.autopilot.guidance.mission.items import DO_AUX_FUNCTION, FENCE_SWITCH, jump_tags, place_of
 from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, LegPhase, MissionContext, phases_of
 from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.mission.service import MissionProgress
@@ -64,7 +65,7 @@ class MissionStep(NamedTuple):
     flying: bool
 
 
-class MissionRecord(NamedTuple):
+class MissionRecord(Record, frozen=True):
     """Progress of a mission for a restart; context, defaults and order before are of the start of the item."""
 
     seq: int

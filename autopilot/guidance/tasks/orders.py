@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 
+from colibri.common.records import Record
 from colibri.common.types import Vector
 
 
@@ -61,7 +62,7 @@ Order: TypeAlias = GoTo | Orbit | TakeOff | Land | Return | Hold
 _KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Orbit, TakeOff, Land, Return, Hold)}
 
 
-class OrderRecord(NamedTuple):
+class OrderRecord(Record, frozen=True):
     kind: str
     fields: tuple[Any, ...]
 

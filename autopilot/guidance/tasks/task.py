@@ -6,13 +6,14 @@ from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, V
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, target_of
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 
 _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
-class ClientInputs(NamedTuple):
+class ClientInputs(Record, frozen=True):
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
     followed: TargetState | None = None
@@ -22,7 +23,7 @@ class ClientInputs(NamedTuple):
 NOT_STEERED = ClientInputs()
 
 
-class TaskContext(NamedTuple):
+class TaskContext(Record, frozen=True):
     now_us: int  # path time at which commands take effect
     state: VehicleState
     reference: Reference
@@ -51,7 +52,7 @@ class TaskContext(NamedTuple):
         return (x, y, z)
 
 
-class PositionMotion(NamedTuple):
+class PositionMotion(Record, frozen=True):
     """Motion by position and yaw: target, limits and pace."""
 
     target: Target

@@ -1,7 +1,6 @@
 """The supervisor alone: for each condition and each choice of action, what begins, is said and remembered."""
 
 import pytest
-from msgspec.structs import replace
 
 from colibri.autopilot.commander.rules.failsafe_conditions import FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_parameters import settings
@@ -76,7 +75,7 @@ def test_a_failsafe_begins_once_and_survives_a_restart(condition: Condition) -> 
 )
 def test_the_charge_state_is_that_of_the_failsafes(remaining: float, state: int) -> None:
     watches, _ = supervisor()
-    look(watches, WELL._replace(battery=replace(FULL, remaining=remaining)))
+    look(watches, WELL._replace(battery=FULL._replace(remaining=remaining)))
     assert watches.charge_state == state
 
 
@@ -85,7 +84,7 @@ def test_parameters_are_gone_by_once_they_are_adopted() -> None:
     watches = Supervisor(parameters, lines)
     assert watches.memory == FailsafeMemory()
     parameters.set("BAT_LOW_THR", 0.2)
-    inputs = WELL._replace(battery=replace(FULL, remaining=0.19))
+    inputs = WELL._replace(battery=FULL._replace(remaining=0.19))
     look(watches, inputs)
     assert not watches.holds(Condition.BATTERY_LOW)
     watches.adopt(parameters)

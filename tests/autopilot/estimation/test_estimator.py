@@ -241,7 +241,7 @@ def test_short_nonsense_of_inertial_sensors_is_bridged(bad: float) -> None:
 
 @pytest.mark.parametrize("axes", ["rate_flu_rad_s", "specific_force_flu_m_s2"])
 def test_a_frozen_inertial_sensor_is_told(axes: str) -> None:
-    frozen = since(5.0, lambda frame: frame._replace(**{axes: (0.01, 0.02, 0.03)}))  # type: ignore[arg-type]
+    frozen = since(5.0, lambda frame: frame._replace(**{axes: (0.01, 0.02, 0.03)}))
     after = last(estimates(recorded(source.hover, 2, 7.0).frames, frozen))
     assert sum(count for (_, reason), count in after.rejected.items() if reason is Reason.FROZEN) > 400
     assert after.health.gyroscope == (axes != "rate_flu_rad_s")

@@ -5,7 +5,6 @@ from math import exp
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions, attitude_loop, box_of
@@ -121,7 +120,7 @@ def test_later_samples_of_the_last_plan_hardly_count() -> None:
     z = 1e-4 * np.random.default_rng(6).normal(size=12)
     _, plan = LAW.decide(z, level, hover_n, None)
     _, other = LAW.decide(-z, level, hover_n, None)
-    mixed = replace(plan, commands=np.vstack([plan.commands[:3], other.commands[3:]]))
+    mixed = plan._replace(commands=np.vstack([plan.commands[:3], other.commands[3:]]))
     one, two = (LAW.decide(z, level, hover_n, each)[0] for each in (plan, mixed))
     assert np.abs(one - two).max() < 2e-3 * np.abs(one).max()
 

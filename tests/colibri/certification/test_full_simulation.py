@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, VehicleState
 from colibri.autopilot.control.lpv_mpc import law as lpv_mpc
@@ -102,7 +101,7 @@ def values(
     x[9] = np.sqrt(1.0 - (x[10:13] ** 2).sum())
     x[13:17] = speeds * VEHICLE.rotors.max_speed
     tracked = controller.initial(VEHICLE.hover_speed).tracked
-    memory = memory_of(replace(tracked, rotors=np.stack([speeds, speeds, wrench, wrench])), start[9:].copy())
+    memory = memory_of(tracked._replace(rotors=np.stack([speeds, speeds, wrench, wrench])), start[9:].copy())
     count = controller.preview.samples
     demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, HOVER_N))
     found = []

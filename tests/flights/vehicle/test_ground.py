@@ -4,7 +4,6 @@ from collections.abc import Callable
 from math import hypot, nan
 
 import pytest
-from msgspec.structs import replace
 
 from colibri.autopilot.commander.rules.modes import FIRST, Mode
 from colibri.mavlink.wire.dialect import mav
@@ -105,7 +104,7 @@ def test_force_stops_the_rotors_in_the_air(sitl: Sitl, command: tuple[float, ...
 def test_a_falling_vehicle_armed_by_force_recovers(sitl: Sitl) -> None:
     sitl.disarm(force=True)
     fallen = starting_world(Start(z=20.0, vx=2.0, vz=-5.0, p=1.0), load_vehicle("hummingbird"))
-    sitl.inside.world = replace(fallen, time_us=sitl.time_us)
+    sitl.inside.world = fallen._replace(time_us=sitl.time_us)
     sitl.run(0.2)
     assert sitl.velocity[2] < -6.0
     sitl.arm(force=True)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from msgspec.structs import replace
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.common.rotations import quaternion_from_euler
@@ -94,7 +93,7 @@ def test_changes_are_events_and_errors(tmp_path: Path) -> None:
     still = FLYING._replace(landed_state=mav.MAV_LANDED_STATE_ON_GROUND)
     later = [
         still,
-        FLYING._replace(fence_breached=True, gps_ok=False, battery=replace(BATTERY, charge_state=2)),
+        FLYING._replace(fence_breached=True, gps_ok=False, battery=BATTERY._replace(charge_state=2)),
         FLYING,
         still._replace(armed=False, custom_mode=9),
     ]

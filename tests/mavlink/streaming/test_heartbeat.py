@@ -52,7 +52,7 @@ def test_it_says_who_and_how(identity: Identity, autopilot: int) -> None:
     ],
 )
 def test_the_state_of_the_system(service: HeartbeatService, changes: dict[str, bool], state: int) -> None:
-    service.update(AT_REST._replace(**changes))  # type: ignore[arg-type]
+    service.update(AT_REST._replace(**changes))
     (send,) = service.poll(0)
     assert send.fields[4] == state
 
@@ -61,7 +61,7 @@ def test_the_state_of_the_system(service: HeartbeatService, changes: dict[str, b
 def test_news_do_not_wait(service: HeartbeatService, news: dict[str, int]) -> None:
     list(service.poll(0))
     assert list(service.poll(4_000)) == []
-    service.update(AT_REST._replace(**news))  # type: ignore[arg-type]
+    service.update(AT_REST._replace(**news))
     assert len(list(service.poll(8_000))) == 1
     assert [now_us for now_us, _ in beats(service, 12_000, 2_100_000)] == [1_008_000, 2_008_000]
 

@@ -5,7 +5,6 @@ from math import isnan
 import msgspec
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
@@ -57,7 +56,7 @@ def test_the_top_speed_is_proportional_to_the_voltage(lag: bool, integrator: Int
 
 
 def test_an_empty_battery_gives_what_its_voltage_allows() -> None:
-    empty = replace(starting_world(Start(z=500.0), VEHICLE), charge_used_ah=3.0 * AH)
+    empty = starting_world(Start(z=500.0), VEHICLE)._replace(charge_used_ah=3.0 * AH)
     world = flight(VEHICLE, empty, command(TOP, vehicle=VEHICLE), 1.0)[-1]
     assert world.voltage_v < EMPTY_V
     assert max(world.rotor_speeds) == pytest.approx(TOP * world.voltage_v / FULL_V, rel=1e-3)

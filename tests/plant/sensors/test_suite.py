@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from colibri.common.earth.atmosphere import altitude_m, pressure_pa, temperature_c
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of
@@ -69,7 +68,7 @@ def standing(attitude: Quaternion = (1.0, 0.0, 0.0, 0.0)) -> World:
 
 def watch(world: World, sensors: SensorSuite, duration_s: float, interval_us: int = FRAME_US) -> list[SensorFrame]:
     times_us = range(0, round(duration_s * 1e6), interval_us)
-    return [sensors.measure(replace(world, time_us=time_us)) for time_us in times_us]
+    return [sensors.measure(world._replace(time_us=time_us)) for time_us in times_us]
 
 
 def seldom(seed: int, duration_s: float) -> list[SensorFrame]:
@@ -233,7 +232,7 @@ def test_another_seed_errs_otherwise_in_everything() -> None:
 def test_a_frame_asked_for_again_is_the_same_frame() -> None:
     once, twice = suite(), suite()
     for time_us in range(0, 500_000, FRAME_US):
-        world = replace(standing(), time_us=time_us)
+        world = standing()._replace(time_us=time_us)
         frame = twice.measure(world)
         assert twice.measure(world) is frame
         assert frame == once.measure(world)
@@ -245,6 +244,6 @@ def test_the_wind_of_the_moment_is_felt() -> None:
     assert HUMMINGBIRD.drag is not None
     drag_n_s_m = HUMMINGBIRD.drag.linear_n_s_m[0]
     for wind_m_s in (4.0, -7.0):
-        x, y, z = turbulent.specific_force(replace(still, wind_enu_m_s=(wind_m_s, 0.0, 0.0)))
+        x, y, z = turbulent.specific_force(still._replace(wind_enu_m_s=(wind_m_s, 0.0, 0.0)))
         assert x == pytest.approx(drag_n_s_m * wind_m_s / HUMMINGBIRD.body.mass_kg)
         assert (y, z) == (0.0, 0.0)

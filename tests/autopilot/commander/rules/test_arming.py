@@ -79,4 +79,4 @@ def test_every_reason_is_told_at_once() -> None:
         "no height estimate",
         "battery critical",
     )
-    assert len(list(refusals(inputs))) == len(ArmingInputs._fields) + 1  # of the state, tilt and speed
+    assert len(list(refusals(inputs))) == len(ArmingInputs.__struct_fields__) + 1  # of the state, tilt and speed

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from colibri.autopilot.control.rotor_loss.detector import ALARM, MAX_EVIDENCE, RotorWatch
 from colibri.common.types import PerRotor
@@ -98,7 +97,7 @@ def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
     assert flight.fly(WHOLE, after) is None
     state = np.array(flight.world.state)
     state[:6] += jump
-    flight.world = replace(flight.world, state=tuple(state.tolist()))
+    flight.world = flight.world._replace(state=tuple(state.tolist()))
     assert flight.fly(WHOLE, 20) is None
     assert flight.watch.max_evidence <= MAX_EVIDENCE
 
