@@ -99,7 +99,7 @@ class PlantClient:
         while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
             ahead_us.append(time_us)
             time_us += interval_us
-        end.answer(step.command, step.faults, [step.command._replace(time_us=time_us) for time_us in ahead_us])
+        end.answer(step.command._replace(frames=1 + len(ahead_us)) if ahead_us else step.command, step.faults)
         return step, ahead_us
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:

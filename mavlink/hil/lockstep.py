@@ -7,8 +7,9 @@ The plant sends the frame of time t and advances only with the command that name
 - messages of a time other than the awaited one are dropped.
 
 Between two control samples the command stays. To a plant that takes answers ahead (`TAKES_AHEAD` in its HEARTBEAT), an
-autopilot without ground stations therefore answers a control sample with the commands of all frames up to the next one,
-in one datagram. The plant advances through these frames without waiting; it does not send those that hold only a state.
+autopilot without ground stations therefore answers a control sample and all frames up to the next one by one command,
+which holds their number (HIL_ACTUATOR_CONTROLS.flags, bits 8 to 23: how many more). The plant advances through these
+frames without waiting; it does not send those that hold only a state.
 
 The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (ATTITUDE_QUATERNION for state frames, HIL_SENSOR
 for sensor frames) and a HEARTBEAT. The plant begins with the first such call, and resumes with a restarted autopilot.
@@ -37,7 +38,7 @@ CALL_AFTER_S = 1.0  # wall-clock silence before the autopilot calls again, and a
 CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 BATTERY_EVERY_US = 500_000
-FREE_RUNNING, TAKES_AHEAD = 1, 2  # HEARTBEAT.custom_mode of a free-running plant, and of one that takes answers ahead
+FREE_RUNNING, TAKES_AHEAD = 1, 3  # HEARTBEAT.custom_mode of a free-running plant, and of one that takes answers ahead
 FRAME_INTERVALS_US = range(1_000, 1_000_001, 1_000)
 
 ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: dialect.MSG_HIL_SENSOR}

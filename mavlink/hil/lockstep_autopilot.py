@@ -14,6 +14,7 @@ from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Message
 
+_NOTHING = range(0)
 _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
@@ -32,7 +33,7 @@ class AutopilotEnd(AnsweringEnd):
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._kind: int | None = None  # of the plant
         self._is_plain = False  # whether the last frame came alone
-        self._answered_us: frozenset[int] = frozenset()  # times of the commands in the last answer
+        self._answered_us = _NOTHING  # times of the frames of the last answer that need no other one
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Return the datagram's frame if it is the next one to compute."""
@@ -80,13 +81,8 @@ class AutopilotEnd(AnsweringEnd):
         self._time_us = time_us
         self._codec.skip(answers)
 
-    def answer(
-        self,
-        command: ActuatorCommand,
-        faults: Sequence[Fault | WorldChange] = (),
-        ahead: Sequence[ActuatorCommand] = (),
-    ) -> None:
-        """Answer the last frame, and with `ahead` the next ones; of these, frames of states are not returned."""
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
+        """Answer the last frame, or several frames from it on: of these, frames of states are not returned."""
         if command.time_us in self._answered_us:
             return
         answer = encode_actuators(self._codec, command)
@@ -95,12 +91,12 @@ class AutopilotEnd(AnsweringEnd):
             answer += encode(self._codec, fault, self._plant)  # type: ignore[arg-type]
         if command.time_us % lockstep.HEARTBEAT_EVERY_US == 0:
             answer += self._heartbeat(command.armed)
-        for coming in ahead:
-            answer += encode_actuators(self._codec, coming)
-        self._answered_us = frozenset(coming.time_us for coming in ahead)
-        if ahead and self._feedback is Feedback.STATE:
-            self._time_us = ahead[-1].time_us
-            self._answered_us |= {command.time_us}
+        interval_us = self._frame_interval_us
+        answered_us = range(command.time_us, command.time_us + command.frames * interval_us, interval_us)
+        if command.frames > 1 and self._feedback is Feedback.STATE:
+            self._time_us, self._answered_us = answered_us[-1], answered_us
+        else:
+            self._answered_us = answered_us[1:]
         self._answer = answer
         self._outbox.append(answer)
 
@@ -141,7 +137,7 @@ class AutopilotEnd(AnsweringEnd):
         self._received_s = now_s
         self._time_us = frame.time_us
         if frame.time_us not in self._answered_us:
-            self._answer, self._answered_us = None, frozenset()
+            self._answer, self._answered_us = None, _NOTHING
         return frame
 
     def _follows(self, time_us: int, before_us: int) -> bool:

@@ -1,7 +1,7 @@
 """The plant's end of the lockstep protocol."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable
 
 from colibri.common.records import Record
 from colibri.common.types import Address
@@ -65,7 +65,7 @@ class PlantEnd:
         self._begun = False
         self._awaited_us: int | None = None
         self._answered_us: int | None = None
-        self._ahead: dict[int, ActuatorCommand] = {}  # for frames after the last one that was answered
+        self._accepted: ActuatorCommand | None = None  # the last one
         self._battery: PlantBattery | None = None
         self._faults: list[Fault | WorldChange] = []
         self._resend_at_s = 0.0
@@ -105,20 +105,18 @@ class PlantEnd:
         self._send([self._frames], now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        commands = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else []
-        if not commands:
+        command = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else None
+        if command is None:
             return self._receive_any(datagram, sender, now_s)
-        size = len(datagram) // len(commands)
-        for at in range(0, len(datagram), size):
-            self._note(datagram[at : at + size], now_s)
-        return self._accept_first(commands)
+        self._note(datagram, now_s)
+        return self._accept(command)
 
-    def take_ahead(self, time_us: int) -> ActuatorCommand | None:
-        """Return the command of the next frame if it came with the last answer."""
-        return self._ahead.pop(time_us, None)
+    def ahead(self, time_us: int) -> ActuatorCommand | None:
+        """Return the command of the next frame if the last one answers it, too."""
+        return None if self._accepted is None else self._answer_of(self._accepted, time_us)
 
     def _receive_any(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        commands: list[ActuatorCommand | None] = []
+        command: ActuatorCommand | None = None
         asked: list[Message] = []
         for message in self._codec.decode(datagram):
             if message.source != self._autopilot:
@@ -131,13 +129,12 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender, now_s)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
-                commands.append(state.decode_actuators(message, self._rotors))
+                command = self._accept(state.decode_actuators(message, self._rotors)) or command
             else:
                 self.dropped["unexpected"] += 1
                 continue
             if sender == self.peer:
                 self._note(message.frame, now_s)
-        command = self._accept_first(commands)
         for message in asked:
             self._receive_fault(message, answered=command is not None)
         return command
@@ -233,31 +230,30 @@ class PlantEnd:
         self._peer_received_s = now_s
         self.received.append(frame)
 
-    def _accept_first(self, commands: Sequence[ActuatorCommand | None]) -> ActuatorCommand | None:
-        """Accept the awaited command of a datagram, and those after it ahead; otherwise the newest one."""
-        accepted = None
-        for command in commands:
-            if accepted is not None and self.waits and command is not None:
-                self._ahead[command.time_us] = command
-            else:
-                accepted = self._accept(command) or accepted
-        return accepted
-
     def _accept(self, command: ActuatorCommand | None) -> ActuatorCommand | None:
         if command is None:
             self.dropped["invalid"] += 1
-        elif not self._is_awaited(command.time_us):
+            return None
+        answer = self._answer_of(command, self._awaited_us) if self.waits else self._newest(command)
+        if answer is None:
             self.dropped["repeated"] += 1
-            command = None
         elif self.waits:
-            self._awaited_us = None
-            self._ahead.clear()
+            self._awaited_us, self._accepted = None, command
             self._unanswered.clear()
-        else:
-            self._answered_us = command.time_us
-        return command
+        return answer
 
-    def _is_awaited(self, time_us: int) -> bool:
-        if self.waits or self._awaited_us is None:
-            return time_us == self._awaited_us
-        return time_us <= self._awaited_us and (self._answered_us is None or time_us > self._answered_us)
+    def _answer_of(self, command: ActuatorCommand, time_us: int | None) -> ActuatorCommand | None:
+        """Return the answer to the frame of a time, if the command holds it."""
+        if time_us == command.time_us:
+            return command
+        if time_us is None or not 0 < time_us - command.time_us < command.frames * self.frame_interval_us:
+            return None
+        return ActuatorCommand(time_us, command.controls, command.armed)
+
+    def _newest(self, command: ActuatorCommand) -> ActuatorCommand | None:
+        if self._awaited_us is None or command.time_us > self._awaited_us:
+            return None
+        if self._answered_us is not None and command.time_us <= self._answered_us:
+            return None
+        self._answered_us = command.time_us
+        return command

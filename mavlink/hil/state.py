@@ -14,6 +14,7 @@ from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
 ROTORS = 4  # of a plant that is not told otherwise
 LOCKSTEP_FLAG = 1  # HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message
+_FRAMES_BIT, MAX_FRAMES = 8, 1 << 16  # from bit 8, 16 bits: how many further frames it answers
 
 UNIT_NORM_TOLERANCE = 1e-3
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
@@ -46,6 +47,7 @@ class ActuatorCommand(Record, frozen=True):
     time_us: int
     controls: PerRotor
     armed: bool
+    frames: int = 1  # that it answers, from that one on
 
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
@@ -90,26 +92,20 @@ def _frame(time_us: int, numbers: Sequence[float]) -> StateFrame | None:
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
     controls, mode = command.controls, _ARMED if command.armed else _DISARMED
-    return actuator_frame(len(controls)).encode(codec, (command.time_us, LOCKSTEP_FLAG, *controls, mode))
+    flags = LOCKSTEP_FLAG | command.frames - 1 << _FRAMES_BIT
+    return actuator_frame(len(controls)).encode(codec, (command.time_us, flags, *controls, mode))
 
 
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     """Return the command as rounded by `encode_actuators` and `read_actuators`."""
-    return _within_range(command.time_us, tuple(array("f", command.controls)), command.armed)
+    return _within_range(command.time_us, tuple(array("f", command.controls)), command.armed, command.frames)
 
 
-def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> list[ActuatorCommand]:
-    """Read a datagram of nothing but valid commands of `source`; otherwise an empty list."""
-    layout, commands = actuator_frame(rotors), []
-    if len(datagram) % layout.size:
-        return []
-    for at in range(0, len(datagram), layout.size):
-        numbers = layout.read(datagram, at, source)
-        command = _command(numbers) if numbers else None
-        if command is None:
-            return []
-        commands.append(command)
-    return commands
+def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:
+    """Read a datagram of nothing but a valid command of `source`; otherwise `None`."""
+    layout = actuator_frame(rotors)
+    numbers = layout.read(datagram, 0, source) if len(datagram) == layout.size else None
+    return _command(numbers) if numbers else None
 
 
 def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand | None:
@@ -117,12 +113,12 @@ def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand 
 
 
 def _command(numbers: Sequence[Any]) -> ActuatorCommand | None:
-    time_us, _, *controls, mode = numbers
-    return _within_range(time_us, tuple(controls), bool(mode & MODE_ARMED))
+    time_us, flags, *controls, mode = numbers
+    return _within_range(time_us, tuple(controls), bool(mode & MODE_ARMED), (flags >> _FRAMES_BIT) % MAX_FRAMES + 1)
 
 
-def _within_range(time_us: int, controls: PerRotor, armed: bool) -> ActuatorCommand | None:
+def _within_range(time_us: int, controls: PerRotor, armed: bool, frames: int) -> ActuatorCommand | None:
     for control in controls:
         if not 0.0 <= control <= 1.0:
             return None
-    return ActuatorCommand(time_us, controls, armed)
+    return ActuatorCommand(time_us, controls, armed, frames)

@@ -113,7 +113,7 @@ class Server:
     def _ahead(self, plant: Plant) -> ActuatorCommand | None:
         """Return the command of a frame that was answered ahead; the frame is sent if it holds more than a state."""
         time_us = plant.world.time_us
-        command = self._end.take_ahead(time_us)
+        command = self._end.ahead(time_us)
         if command is None:
             return None
         if self._end.feedback is Feedback.SENSORS or plant.has_news or self._end.sends_battery(time_us):

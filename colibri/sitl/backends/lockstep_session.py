@@ -138,9 +138,9 @@ class LockstepSession:
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
-        commands = read_actuators(answer, self._autopilot_source, self._rotors)
-        if commands:
-            return commands[0]
+        command = read_actuators(answer, self._autopilot_source, self._rotors)
+        if command is not None:
+            return command
         for message in self._codec.decode(answer):
             command = decode_actuators(message, self._rotors) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:

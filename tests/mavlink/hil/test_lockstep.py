@@ -278,7 +278,7 @@ def flown_over_a_bad_link(seed: int, feedback: Feedback, *, ahead: int) -> None:
                 command = plant.receive(datagram, ADDRESS, now_s)
                 while command:
                     obeyed.append(command.time_us)
-                    command = plant.take_ahead(command.time_us + INTERVAL_US)
+                    command = plant.ahead(command.time_us + INTERVAL_US)
                     if command is None or feedback is Feedback.SENSORS:
                         plant.offer(tell(obeyed[-1] + INTERVAL_US), now_s)
             else:
@@ -286,8 +286,8 @@ def flown_over_a_bad_link(seed: int, feedback: Feedback, *, ahead: int) -> None:
                 if received:
                     computed.append(received.frame)
                     due = received.frame.time_us % ((ahead + 1) * INTERVAL_US) == 0
-                    coming = [received.frame.time_us + k * INTERVAL_US for k in range(1, ahead + 1) if due]
-                    autopilot.answer(command_at(received.frame.time_us), (), list(map(command_at, coming)))
+                    command = command_at(received.frame.time_us)
+                    autopilot.answer(command._replace(frames=ahead + 1) if due else command)
         for datagram in autopilot.take_outbox():
             post("plant", datagram)
     assert obeyed == [sample * INTERVAL_US for sample in range(len(obeyed))]
@@ -304,14 +304,15 @@ def test_a_plant_that_sends_a_frame_answered_ahead_is_answered_again(plant: Plan
     assert autopilot.receive(outgoing.datagram, 0.0)
     assert autopilot.may_answer_ahead(2 * INTERVAL_US)
     assert not autopilot.may_answer_ahead(5 * INTERVAL_US)  # its frame tells of the battery
-    autopilot.answer(command_at(INTERVAL_US), (), [command_at(2 * INTERVAL_US)])
+    answer = command_at(INTERVAL_US)._replace(frames=2)
+    autopilot.answer(answer)
     (both,) = autopilot.take_outbox()
     assert autopilot.receive(outgoing.datagram, 0.0) is None
     assert autopilot.take_outbox() == [both]
-    assert plant.receive(both, ADDRESS, 0.0) == command_at(INTERVAL_US)
-    assert b"".join(plant.received[-2:]) == both
-    assert plant.take_ahead(3 * INTERVAL_US) is None
-    assert plant.take_ahead(2 * INTERVAL_US) == command_at(2 * INTERVAL_US)
+    assert plant.receive(both, ADDRESS, 0.0) == answer
+    assert plant.received[-1] == both
+    assert plant.ahead(3 * INTERVAL_US) is None
+    assert plant.ahead(2 * INTERVAL_US) == command_at(2 * INTERVAL_US)
     assert autopilot.receive(offered(plant, frame_at(2 * INTERVAL_US)), 0.0) is None
     assert autopilot.take_outbox() == [both]
     assert plant.receive(both, ADDRESS, 0.0) == command_at(2 * INTERVAL_US)

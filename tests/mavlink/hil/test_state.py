@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil import state
-from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.hil.state import MAX_FRAMES, ActuatorCommand, StateFrame
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 from tests.support.strategies import quaternions, vectors
@@ -67,13 +67,12 @@ def test_halves_of_different_frames_are_refused() -> None:
     assert state.decode_state(attitude, position) is None
 
 
-CONTROLS = st.floats(0.0, 1.0, width=32)
+CONTROLS, TIMES = st.floats(0.0, 1.0, width=32), st.integers(0, 2**64 - 1)
 
 
-@given(st.tuples(CONTROLS, CONTROLS, CONTROLS, CONTROLS), st.booleans(), st.integers(0, 2**64 - 1))
-def test_actuator_round_trip(controls: tuple[float, float, float, float], armed: bool, time_us: int) -> None:
+@given(st.builds(ActuatorCommand, TIMES, st.tuples(*(CONTROLS,) * 4), st.booleans(), st.integers(1, MAX_FRAMES)))
+def test_actuator_round_trip(command: ActuatorCommand) -> None:
     codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
-    command = ActuatorCommand(time_us, controls, armed)
     (message,) = codec.decode(state.encode_actuators(codec, command))
     assert state.decode_actuators(message) == command
 
