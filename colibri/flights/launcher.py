@@ -9,6 +9,7 @@ import json
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from multiprocessing import current_process, get_context
@@ -40,8 +41,22 @@ def name_of(spec: ProcessSpec) -> str:
 
 
 def can_fork() -> bool:
-    """Whether this process may be forked: locks of other threads would stay held."""
-    return _TASKS.is_dir() and len(list(_TASKS.iterdir())) == 1 and not current_process().daemon
+    """Whether this process may be forked: locks of other threads would stay held.
+
+    A first fork, which ends at once, has OpenBLAS end its threads; it starts them again when it needs them.
+    """
+    if not _TASKS.is_dir() or current_process().daemon or threading.active_count() > 1:
+        return False
+    if _has_other_threads():
+        child = os.fork()
+        if child == 0:
+            os._exit(0)
+        os.waitpid(child, 0)
+    return not _has_other_threads()
+
+
+def _has_other_threads() -> bool:
+    return len(list(_TASKS.iterdir())) > 1
 
 
 class Child:
