@@ -15,9 +15,14 @@ _TAYLOR_NORM = 0.5  # larger matrices are halved and squared: 0.5^16 / 16! is fa
 
 @compiled
 def put(values: Array, out: Array) -> None:
-    """Write `values` into `out`; `out[:] = values` takes seconds to compile."""
-    for i in range(out.shape[0]):
-        out[i] = values[i]
+    """Write `values` into `out`; `out[:] = values`, as a sum of arrays, takes seconds to compile."""
+    if out.ndim == 1:  # decided before it is compiled
+        for i in range(out.shape[0]):
+            out[i] = values[i]
+    else:
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                out[i, j] = values[i, j]
 
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
@@ -40,6 +45,16 @@ def matvec(A: Array, x: Array) -> Array:
         for k in range(A.shape[1]):
             product[i] += A[i, k] * x[k]
     return product
+
+
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX}, float64)")
+def add(A: Array, B: Array, factor: float) -> Array:
+    """Return A + factor B, both (n, m)."""
+    total = np.empty(A.shape)
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            total[i, j] = A[i, j] + factor * B[i, j]
+    return total
 
 
 @compiled_for(f"float64({_VECTOR}, {_VECTOR})")
@@ -106,10 +121,17 @@ def expm(A: Array) -> Array:
     squarings, size = 0, _max_column_sum(A)
     while _TAYLOR_NORM < size < np.inf:
         size, squarings = 0.5 * size, squarings + 1
-    scaled = A * 0.5**squarings
-    total = np.eye(A.shape[0])
+    eye, scaled = np.eye(A.shape[0]), A.copy()
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            scaled[i, j] *= 0.5**squarings
+    total = eye
     for k in range(_TAYLOR_TERMS, 0, -1):
-        total = np.eye(A.shape[0]) + matmul(scaled, total) / k
+        product = matmul(scaled, total)
+        total = eye.copy()
+        for i in range(A.shape[0]):
+            for j in range(A.shape[1]):
+                total[i, j] += product[i, j] / k
     for _ in range(squarings):
         total = matmul(total, total)
     return total

@@ -4,7 +4,7 @@ The law turns the thrust axis the shortest way (reduced attitude: Chaturvedi, Sa
 Systems 31(3), 2011) and damps the yaw rate.
 """
 
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -65,23 +65,31 @@ def mix_with_priority(
     if inverse.shape[0] != 4:
         wrench = np.array((thrust_n, moment_n_m[0], moment_n_m[1], moment_n_m[2]))
         return allocate(wrench, mixing, min_squared, max_squared)
-    tilt = inverse[:, 1] * moment_n_m[0] + inverse[:, 2] * moment_n_m[1]
-    yaw = inverse[:, 3] * moment_n_m[2]
-    room = max_squared - min_squared
-    spread = tilt.max() - tilt.min()
-    if spread > room:
-        tilt *= room / spread
-    lift = inverse[:, 0] * thrust_n
-    minimum, maximum = (lift + tilt).min(), (lift + tilt).max()
-    shift = max(min_squared - minimum, 0.0) + min(max_squared - maximum, 0.0)
-    squared = lift + tilt + shift
-    share = 1.0
-    for i in range(squared.shape[0]):
+    rotors, room = inverse.shape[0], max_squared - min_squared
+    squared, yaw = np.empty(rotors), np.empty(rotors)
+    for i in range(rotors):
+        squared[i] = inverse[i, 1] * moment_n_m[0] + inverse[i, 2] * moment_n_m[1]
+        yaw[i] = inverse[i, 3] * moment_n_m[2]
+    least, most = _range(squared)
+    part = room / (most - least) if most - least > room else 1.0
+    for i in range(rotors):
+        squared[i] = inverse[i, 0] * thrust_n + squared[i] * part
+    least, most = _range(squared)
+    shift, share = max(min_squared - least, 0.0) + min(max_squared - most, 0.0), 1.0
+    for i in range(rotors):
+        squared[i] += shift
         if yaw[i] > 0.0:
             share = min(share, max(max_squared - squared[i], 0.0) / yaw[i])
         elif yaw[i] < 0.0:
             share = min(share, max(squared[i] - min_squared, 0.0) / -yaw[i])
-    result: Array = squared + share * yaw
-    for i in range(result.shape[0]):
-        result[i] = min(max(result[i], min_squared), max_squared)
-    return result
+    for i in range(rotors):
+        squared[i] = min(max(squared[i] + share * yaw[i], min_squared), max_squared)
+    return squared
+
+
+@compiled
+def _range(values: Array) -> tuple[float, float]:
+    least, most = inf, -inf
+    for value in values:
+        least, most = min(least, value), max(most, value)
+    return least, most

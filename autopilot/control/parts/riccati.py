@@ -2,12 +2,21 @@
 
 import numpy as np
 
-from colibri.common.jit import compiled_for
-from colibri.common.matrices import inverse, matmul, solve
+from colibri.common.jit import compiled, compiled_for
+from colibri.common.matrices import add, inverse, matmul, solve
 from colibri.common.types import Array
 
 _DOUBLINGS = 40
 _RESIDUE = 1e-15  # converged if a doubling adds less than this part of the cost matrix
+
+
+@compiled
+def _largest(A: Array) -> float:
+    largest = 0.0
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            largest = max(largest, abs(A[i, j]))
+    return largest
 
 
 @compiled_for("Tuple((float64[:, ::1], float64[:, ::1]))(" + ", ".join(["float64[:, :]"] * 4) + ")")
@@ -20,13 +29,13 @@ def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
     eye = np.eye(A.shape[0])
     F, G, S = A.copy(), matmul(matmul(B, inverse(R)), B.T), Q.copy()
     for _ in range(_DOUBLINGS):
-        W = inverse(eye + matmul(G, S))
+        W = inverse(add(eye, matmul(G, S), 1.0))
         step = matmul(F.T, matmul(S, matmul(W, F)))
-        F, G, S = matmul(F, matmul(W, F)), G + matmul(F, matmul(W, matmul(G, F.T))), S + step
-        if np.abs(step).max() <= _RESIDUE * np.abs(S).max():
+        F, G, S = matmul(F, matmul(W, F)), add(G, matmul(F, matmul(W, matmul(G, F.T))), 1.0), add(S, step, 1.0)
+        if _largest(step) <= _RESIDUE * _largest(S):
             break
     weighted = matmul(B.T, S)
-    return S, solve(R + matmul(weighted, B), matmul(weighted, A))
+    return S, solve(add(R, matmul(weighted, B), 1.0), matmul(weighted, A))
 
 
 def gains(poles: tuple[float, float]) -> tuple[float, float]:

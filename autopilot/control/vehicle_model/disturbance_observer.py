@@ -78,7 +78,9 @@ def observe(
 ) -> Array:
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
     thrust_n, moment_n_m = wrench[0], wrench[1:]
-    middle = 0.5 * (before + now)
+    middle = np.empty_like(now)
+    for i in range(MEASURED):
+        middle[i] = 0.5 * (before[i] + now[i])
     rate, up = middle[3:6], middle[6:]
     after = np.empty_like(estimate)
     drag_n = drag_force(airframe, middle[:3], up, thrust_n)

@@ -43,17 +43,26 @@ def learn_drag(
     drag_n: Vector, unexplained_m_s2: Array, up: Array, airframe: Airframe, interval_s: float, learned: Array
 ) -> Vector:
     """Return the acceleration by drag, m/s², ENU, after learning from the one that thrust and weight do not explain."""
-    drag = np.array(drag_n) / airframe.mass_kg
-    along, unexplained = dot(drag, up) * up, dot(unexplained_m_s2, up) * up
     hover_n_s_m = airframe.drag_xy + airframe.rotor_drag * sqrt(airframe.mass_kg * airframe.gravity_m_s2)
     x_1_s, z_1_s = max(hover_n_s_m / airframe.mass_kg, _LEAST_1_S), max(airframe.drag_z / airframe.mass_kg, _LEAST_1_S)
+    drag, along, unexplained = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        drag[i] = drag_n[i] / airframe.mass_kg
+    drag_up, unexplained_up = dot(drag, up), dot(unexplained_m_s2, up)
+    for i in range(3):
+        along[i], unexplained[i] = drag_up * up[i], unexplained_up * up[i]
+    across_v, across_u, along_v, along_u = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        across_v[i], across_u[i] = (drag[i] - along[i]) / x_1_s, (unexplained_m_s2[i] - unexplained[i]) / x_1_s
+        along_v[i], along_u[i] = along[i] / z_1_s, unexplained[i] / z_1_s
     x, z = learned[_ACROSS:_ALONG], learned[_ALONG:]
-    x_squared, x_product = _deviate((drag - along) / x_1_s, (unexplained_m_s2 - unexplained) / x_1_s, interval_s, x)
-    z_squared, z_product = _deviate(along / z_1_s, unexplained / z_1_s, interval_s, z)
+    x_squared, x_product = _deviate(across_v, across_u, interval_s, x)
+    z_squared, z_product = _deviate(along_v, along_u, interval_s, z)
     if x_squared + z_squared > _MOVING_M_S * _MOVING_M_S:
         _fit(x_squared, x_product, interval_s, x)
         _fit(z_squared, z_product, interval_s, z)
-    drag += x[0] * (drag - along) + z[0] * along
+    for i in range(3):
+        drag[i] += x[0] * (drag[i] - along[i]) + z[0] * along[i]
     return drag[0], drag[1], drag[2]
 
 
@@ -61,10 +70,14 @@ def learn_drag(
 def _deviate(velocity: Array, unexplained: Array, interval_s: float, learned: Array) -> tuple[float, float]:
     """Update the means; return the squared deviation of the velocity, and the product of both deviations."""
     learned[2] = min(learned[2] + interval_s, _MEAN_S)
-    learned[3:6] += interval_s / learned[2] * (velocity - learned[3:6])
-    learned[6:9] += interval_s / learned[2] * (unexplained - learned[6:9])
-    deviation = velocity - learned[3:6]
-    return dot(deviation, deviation), dot(deviation, unexplained - learned[6:9])
+    squared, product = 0.0, 0.0
+    for i in range(3):
+        learned[3 + i] += interval_s / learned[2] * (velocity[i] - learned[3 + i])
+        learned[6 + i] += interval_s / learned[2] * (unexplained[i] - learned[6 + i])
+        deviation = velocity[i] - learned[3 + i]
+        squared += deviation * deviation
+        product += deviation * (unexplained[i] - learned[6 + i])
+    return squared, product
 
 
 @compiled

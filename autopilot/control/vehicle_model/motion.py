@@ -73,6 +73,7 @@ def carry(
     """
     x = x.copy()
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    y = np.empty_like(x)
     for command in range(durations_s.size):
         steps = max(1, ceil(durations_s[command] / _STEP_S - _ROUNDING))
         h = durations_s[command] / steps
@@ -83,9 +84,10 @@ def carry(
                 x[13 + i] = min(target[i], top)
         for _ in range(steps):
             _write_derivative(k1, x, target, disturbance, open_voltage_v, packed[0])
-            _write_derivative(k2, x + 0.5 * h * k1, target, disturbance, open_voltage_v, packed[0])
-            _write_derivative(k3, x + 0.5 * h * k2, target, disturbance, open_voltage_v, packed[0])
-            _write_derivative(k4, x + h * k3, target, disturbance, open_voltage_v, packed[0])
+            for k, after, part_s in ((k1, k2, 0.5 * h), (k2, k3, 0.5 * h), (k3, k4, h)):
+                for i in range(x.size):
+                    y[i] = x[i] + part_s * k[i]
+                _write_derivative(after, y, target, disturbance, open_voltage_v, packed[0])
             for i in range(x.size):
                 x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     length = sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
