@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
+from llvmlite.binding import ffi
 from numba import config, njit
 from numba.core.event import Event, Listener, register
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise Error("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
 
 Packed: TypeAlias = NDArray[np.void]
+
+# Without the times of numba's calls of LLVM, which nobody reads: they take a twentieth of a compilation.
+getattr(getattr(ffi.lib, "_lock", None), "_cblist", []).clear()
 
 _LINE = 64  # bytes of a cache line
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}  # C calls no kernel: compiled sooner
