@@ -57,6 +57,14 @@ def test_no_more_is_estimated_than_the_limit() -> None:
     assert estimate[9] == pytest.approx(1e-3)
 
 
+def test_an_estimate_that_decays_becomes_zero() -> None:
+    """Otherwise it would end among the subnormal numbers, with which the law takes seven times as long."""
+    level, estimate = np.array([*NO_MOMENT, *NO_MOMENT, 0.0, 0.0, 1.0]), np.full(ESTIMATES, 1e-9)
+    for _ in range(round(30.0 / INTERVAL_S)):
+        estimate = observe(estimate, level, level, HOVER, 0.0, 0.7, packed(OBSERVER)[0])
+    assert not estimate.any()
+
+
 def test_near_the_ground_only_small_disturbances_are_learned() -> None:
     found, before = np.array([*range(6), 3.0, -3.0, 3.0, 0.25, -0.25, 0.25]), np.zeros(ESTIMATES)
     before[11] = 0.2
