@@ -1,7 +1,6 @@
 """Inertial samples and measurements that wait for the delayed filter."""
 
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from colibri.autopilot.estimation.measurements.instrument import Value
 from colibri.autopilot.estimation.sensing.inertial import InertialReading, sample_between
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import compiled
+from colibri.common.records import Record
 from colibri.common.types import Array, Vector
 
 _FEWEST = 6  # samples that show noise
@@ -18,7 +18,7 @@ _LEARNT_PART = 0.1  # of the present force in the mean
 _BRIDGED_S = 0.1  # longer gaps between frames are crossed without the measurements at their ends
 
 
-class Waiting(NamedTuple):
+class Waiting(Record, frozen=True):
     """Measurements at the end of a sample, one for each instrument."""
 
     time_us: int

@@ -11,7 +11,7 @@ from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import mav
 
 
-class Test(NamedTuple):
+class Test(Record, frozen=True):
     """Last test of a measurement; `time_us` is -1 before the first."""
 
     time_us: int
@@ -33,7 +33,7 @@ _HORIZONTAL_VELOCITY = mav.ESTIMATOR_VELOCITY_HORIZ | mav.ESTIMATOR_POS_HORIZ_RE
 _HORIZONTAL_POSITION = mav.ESTIMATOR_POS_HORIZ_ABS | mav.ESTIMATOR_PRED_POS_HORIZ_ABS
 
 
-class Health(NamedTuple):
+class Health(Record, frozen=True):
     """Usable parts of the estimate: roll and pitch to 10°, yaw to 15°, velocity to 1 m/s, position to 5 m.
 
     Attributes:

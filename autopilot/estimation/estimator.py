@@ -146,7 +146,7 @@ class Estimator:
         self._clock_resets.clear()
         self._time_us = frame.time_us
         before, self._reading = self._reading, self._inertial.read(frame)
-        if self._reading[4:] != before[4:] and self._estimate is not None:
+        if self._estimate is not None:
             self._replace(before)
         rejected = self._rejected
         reads = frame.updated & self._groups or self._reads_messages
@@ -243,7 +243,8 @@ class Estimator:
     def _take(self, now_us: int) -> None:
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
-        time_us, values = self._buffer.take()
+        taken = self._buffer.take()
+        time_us, values = taken.time_us, taken.values
         self.filter_us = time_us
         if values is None:
             return
@@ -337,11 +338,11 @@ class Estimator:
         return self.filter.check(self.filter_us)
 
     def _replace(self, before: InertialReading) -> None:
-        *_, force_modelled, rate_modelled = self._reading
-        if force_modelled != before.force_modelled:
-            self.filter.replace_force(modelled=force_modelled)
-        if rate_modelled != before.rate_modelled:
-            self.filter.replace_rate(modelled=rate_modelled)
+        reading = self._reading
+        if reading.force_modelled != before.force_modelled:
+            self.filter.replace_force(modelled=reading.force_modelled)
+        if reading.rate_modelled != before.rate_modelled:
+            self.filter.replace_rate(modelled=reading.rate_modelled)
 
     @property
     def shaken(self) -> bool:

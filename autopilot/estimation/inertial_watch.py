@@ -60,7 +60,8 @@ class InertialWatch:
         self, buffer: DelayBuffer, filter_: Filter, before: InertialReading, now: InertialReading, interval_s: float
     ) -> None:
         """Examine the newest waiting sample, between two readings, for wild noise or a bias of the gyroscope."""
-        inertial, jump, (time_us, values) = self._inertial, self._rate_jump, buffer.waiting[-1]
+        inertial, jump, waiting = self._inertial, self._rate_jump, buffer.waiting[-1]
+        time_us, values = waiting.time_us, waiting.values
         if not (before.rate_good and now.rate_good):
             jump.forget()
             jump.shakes, inertial.shaken = 0, False

@@ -1,11 +1,12 @@
 """Inertial samples from frames."""
 
 from math import inf
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from colibri.autopilot.estimation.eskf_predict import MODELLED, UNKNOWN
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Rejected, RejectedSource
+from colibri.common.records import Record
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
@@ -49,7 +50,7 @@ class InertialSensor:
         return late_us <= (_FROZEN_US if accepted else _BRIDGED_US) and not self.failed
 
 
-class InertialReading(NamedTuple):
+class InertialReading(Record, frozen=True):
     """Inertial values, m/s² and rad/s, FLU, whether each is usable, and whether it is modelled."""
 
     force: Vector
