@@ -18,7 +18,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 Packed: TypeAlias = NDArray[np.void]
 
-# Without the times of numba's calls of LLVM, which nobody reads: they take a twentieth of a compilation.
+# numba times each of its calls of LLVM; nobody reads these times, and they take a twentieth of a compilation.
 getattr(getattr(ffi.lib, "_lock", None), "_cblist", []).clear()
 
 _LINE = 64  # bytes of a cache line

@@ -15,7 +15,7 @@ _TAYLOR_NORM = 0.5  # larger matrices are halved and squared: 0.5^16 / 16! is fa
 
 @compiled
 def put(values: Array, out: Array) -> None:
-    """Write `values` into `out`; `out[:] = values`, as a sum of arrays, takes seconds to compile."""
+    """Write `values` into `out`; `out[:] = values` takes seconds to compile, as do sums of arrays."""
     if out.ndim == 1:  # decided before it is compiled
         for i in range(out.shape[0]):
             out[i] = values[i]
@@ -47,13 +47,13 @@ def matvec(A: Array, x: Array) -> Array:
     return product
 
 
-@compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX}, float64)")
-def add(A: Array, B: Array, factor: float) -> Array:
-    """Return A + factor B, both (n, m)."""
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
+def add(A: Array, B: Array) -> Array:
+    """Return A + B, both (n, m)."""
     total = np.empty(A.shape)
     for i in range(A.shape[0]):
         for j in range(A.shape[1]):
-            total[i, j] = A[i, j] + factor * B[i, j]
+            total[i, j] = A[i, j] + B[i, j]
     return total
 
 

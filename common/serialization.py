@@ -1,4 +1,4 @@
-"""Plain data ⇄ bytes: named tuples of numbers, texts and float arrays."""
+"""Plain data ⇄ bytes: named tuples and records of numbers, texts and float arrays."""
 
 from typing import Any, TypeVar
 

@@ -173,12 +173,11 @@ class ControlLoop:
 
     def observe(self, frame: StateFrame) -> VehicleState:
         """Return the state of a frame, yaw unwrapped near the previous one."""
-        position, velocity, attitude, rate = (
-            frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, frame.rate_flu_rad_s,
-        )  # fmt: skip
+        time_us, attitude, rate = frame.time_us, frame.attitude, frame.rate_flu_rad_s
+        position, velocity = frame.position_enu_m, frame.velocity_enu_m_s
         phi, theta, psi = euler_from_quaternion(attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
-        euler, time_us = (phi, theta, self._yaw_rad), frame.time_us
+        euler = (phi, theta, self._yaw_rad)
         if not self._reads_motion:
             return VehicleState(position, velocity, attitude, euler, rate)
         before_us, (vx, vy, vz), acceleration = self._seen

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from multiprocessing import current_process, get_context
@@ -48,10 +49,12 @@ def can_fork() -> bool:
     if not _TASKS.is_dir() or current_process().daemon or threading.active_count() > 1:
         return False
     if _has_other_threads():
-        child = os.fork()
-        if child == 0:
-            os._exit(0)
-        os.waitpid(child, 0)
+        with suppress(OSError), warnings.catch_warnings():  # Python warns if other threads are left
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+            if child == 0:
+                os._exit(0)
+            os.waitpid(child, 0)
     return not _has_other_threads()
 
 

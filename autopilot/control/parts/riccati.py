@@ -29,13 +29,13 @@ def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
     eye = np.eye(A.shape[0])
     F, G, S = A.copy(), matmul(matmul(B, inverse(R)), B.T), Q.copy()
     for _ in range(_DOUBLINGS):
-        W = inverse(add(eye, matmul(G, S), 1.0))
+        W = inverse(add(eye, matmul(G, S)))
         step = matmul(F.T, matmul(S, matmul(W, F)))
-        F, G, S = matmul(F, matmul(W, F)), add(G, matmul(F, matmul(W, matmul(G, F.T))), 1.0), add(S, step, 1.0)
+        F, G, S = matmul(F, matmul(W, F)), add(G, matmul(F, matmul(W, matmul(G, F.T)))), add(S, step)
         if _largest(step) <= _RESIDUE * _largest(S):
             break
     weighted = matmul(B.T, S)
-    return S, solve(add(R, matmul(weighted, B), 1.0), matmul(weighted, A))
+    return S, solve(add(R, matmul(weighted, B)), matmul(weighted, A))
 
 
 def gains(poles: tuple[float, float]) -> tuple[float, float]:
