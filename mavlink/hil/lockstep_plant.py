@@ -112,8 +112,11 @@ class PlantEnd:
         return self._accept(command)
 
     def ahead(self, time_us: int) -> ActuatorCommand | None:
-        """Return the command of the next frame if the last one answers it, too."""
-        return None if self._accepted is None else self._answer_of(self._accepted, time_us)
+        """Return the command of a later frame if the last one answers it, too."""
+        last = self._accepted
+        if last is None or not 0 < time_us - last.time_us < last.frames * self.frame_interval_us:
+            return None
+        return ActuatorCommand(time_us, last.controls, last.armed)
 
     def _receive_any(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         command: ActuatorCommand | None = None
@@ -234,7 +237,7 @@ class PlantEnd:
         if command is None:
             self.dropped["invalid"] += 1
             return None
-        answer = self._answer_of(command, self._awaited_us) if self.waits else self._newest(command)
+        answer = self._awaited(command) if self.waits else self._newest(command)
         if answer is None:
             self.dropped["repeated"] += 1
         elif self.waits:
@@ -242,13 +245,11 @@ class PlantEnd:
             self._unanswered.clear()
         return answer
 
-    def _answer_of(self, command: ActuatorCommand, time_us: int | None) -> ActuatorCommand | None:
-        """Return the answer to the frame of a time, if the command holds it."""
-        if time_us == command.time_us:
+    def _awaited(self, command: ActuatorCommand) -> ActuatorCommand | None:
+        """Return the awaited command; one of several frames may come again."""
+        if command.time_us == self._awaited_us:
             return command
-        if time_us is None or not 0 < time_us - command.time_us < command.frames * self.frame_interval_us:
-            return None
-        return ActuatorCommand(time_us, command.controls, command.armed)
+        return None if self._awaited_us is None or command != self._accepted else self.ahead(self._awaited_us)
 
     def _newest(self, command: ActuatorCommand) -> ActuatorCommand | None:
         if self._awaited_us is None or command.time_us > self._awaited_us:

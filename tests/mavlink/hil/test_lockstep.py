@@ -318,6 +318,16 @@ def test_a_plant_that_sends_a_frame_answered_ahead_is_answered_again(plant: Plan
     assert plant.receive(both, ADDRESS, 0.0) == command_at(2 * INTERVAL_US)
 
 
+def test_a_command_of_other_frames_is_no_answer(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    for other in (command_at(INTERVAL_US - 1000), command_at(0)._replace(frames=9), command_at(0)):
+        assert plant.receive(encode_actuators(Codec(1, dialect.AUTOPILOT_COMPONENT), other), ADDRESS, 0.0) is None
+    assert plant.ahead(INTERVAL_US) is None
+    assert plant.dropped["repeated"] == 3
+
+
 def test_a_plant_that_runs_freely_takes_what_is_newer(autopilot: AutopilotEnd) -> None:
     plant = PlantEnd(system_id=1, frame_interval_us=INTERVAL_US, waits=False)
     call(autopilot, plant)
