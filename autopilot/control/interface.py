@@ -286,6 +286,17 @@ class PlanController(Controller[Memory], Protocol[Memory]):
 
 
 @runtime_checkable
+class QuietController(PlanController[Memory], Protocol[Memory]):
+    """A control law that can leave its plan out of the diagnostics, to save time; optional.
+
+    Attributes:
+        shows_plan: False where nobody reads `predicted` and `planned_squared`.
+    """
+
+    shows_plan: bool
+
+
+@runtime_checkable
 class CompiledController(Controller[Memory], Protocol[Memory]):
     """A control law with compiled parts, loaded before the flight; optional."""
 

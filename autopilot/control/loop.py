@@ -17,6 +17,7 @@ from colibri.autopilot.control.interface import (
     Pace,
     PathController,
     PlanController,
+    QuietController,
     VehicleState,
 )
 from colibri.autopilot.control.law_files import table_of
@@ -88,6 +89,7 @@ class ControlLoop:
         self.preview = self.controller.preview
         check_preview(self._name, self.preview)
         self.takes_attitude = isinstance(self.controller, AttitudeController)
+        self._shows_plan = True
         self.plan_columns = self.controller.plan_columns if isinstance(self.controller, PlanController) else None
         self._take_in(self.controller)
         self.control_interval_us = self.controller.control_interval_us
@@ -168,6 +170,11 @@ class ControlLoop:
         else:
             self.begin_in_flight(record.yaw_rad)
 
+    def hide_plan(self) -> None:
+        """Have the law leave its plan out of the diagnostics, if it can: nobody reads it."""
+        self._shows_plan = False
+        self._take_in(self.controller)
+
     def is_due(self, time_us: int) -> bool:
         return time_us % self.control_interval_us == 0
 
@@ -234,6 +241,8 @@ class ControlLoop:
         self._reads_motion = vars(type(controller)).get("reads_motion", True)  # not that of a base class
         lag = rotor_lag(self.vehicle, controller.control_interval_us * 1e-6)
         self._lag = (lag.up, lag.down)
+        if not self._shows_plan and isinstance(controller, QuietController):
+            controller.shows_plan = False
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
         on_path = controller if isinstance(controller, PathController) else None

@@ -85,7 +85,9 @@ def _alone(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Stat
     if note:
         status.say("track", note)
     estimator = estimator_for(spec.feedback, vehicle, spec.home.origin)
-    return track_autopilot(profile, vehicle, flown, perf_counter, estimator=estimator, law=spec.law)
+    autopilot = track_autopilot(profile, vehicle, flown, perf_counter, estimator=estimator, law=spec.law)
+    autopilot.stages.loop.hide_plan()
+    return autopilot
 
 
 def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "GroundService":

@@ -27,6 +27,7 @@ def fly_locally(
     """Record in `topics`, or else in the plan's folder."""
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
+    autopilot.stages.loop.hide_plan()
     setup = setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle, plan.contents.track_file)
     log = log_in(plan.out, setup) if topics is None else AutopilotLog(topics, setup)
     truth = TruthLog(log.topics, plan.plant_vehicle)

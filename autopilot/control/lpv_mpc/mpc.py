@@ -62,7 +62,7 @@ class Plan(Record, frozen=True):
     """A solved QP."""
 
     commands: Array  # squared speeds at each step, (N, m)
-    states: Array  # `planning.PREDICTED`, then the squared speeds of m rotors, (N + 1, 12 + m)
+    states: Array  # `planning.PREDICTED`, nan beyond `Mpc.moments`; squared speeds of m rotors, (N + 1, 12 + m)
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
@@ -148,6 +148,7 @@ class Mpc:
             for each, inputs in ((on_track, rotors), (on_track, rotors + 1), (on_hold, rotors))
         )
         self._commands, self._states = (n, rotors), (n + 1, planning.PREDICTED + rotors)
+        self.moments = n + 1  # of a plan whose motion is computed
 
     def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
         """Return S of the LQR in level flight after the horizon, filled up with zeros to a multiple of four."""
@@ -187,19 +188,22 @@ class Mpc:
         commands, states = np.empty(self._commands), np.empty(self._states)
         started_s = self._clock()
         z: Array | None = qps.minimum
-        is_free, is_beyond, bounds = planning.plan(qps.kind, qps.minimum, False, psi, commands, states)
+        is_free, is_beyond, bounds = planning.plan(
+            qps.kind, qps.minimum, False, psi, self.moments, commands, states
+        )
         status, iterations, slack, tilts, rates = QpStatus.SOLVED, 0.0, 0.0, 0, 0
         if is_beyond or not is_free:
             status, z, iterations, slack, (tilts, rates) = self._solve(*qps, is_free=is_free)
             if z is not None:
-                _, _, bounds = planning.plan(qps.kind, z, True, psi, commands, states)
+                _, _, bounds = planning.plan(qps.kind, z, True, psi, self.moments, commands, states)
         solve_time_s = self._clock() - started_s
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
         active = Active(bounds, 0, tilts, rates)
+        shown = (states, commands) if self.moments > self.horizon else (None, None)
         diagnostics = Diagnostics(
-            status, None, solve_time_s, 0.0, active, slack, states, commands, mass_kg, path_lag_s, iterations
+            status, None, solve_time_s, 0.0, active, slack, *shown, mass_kg, path_lag_s, iterations
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics

@@ -3,7 +3,7 @@
 Commands and corrections are squared rotor speeds in parts of the largest; m is the number of rotors.
 """
 
-from math import inf, radians, sqrt
+from math import inf, nan, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -276,8 +276,10 @@ def is_beyond(kind: Packed, z: Array) -> bool:
 
 
 @compiled
-def plan(kind: Packed, z: Array, solved: bool, psi: float, commands: Array, states: Array) -> tuple[bool, bool, int]:
-    """Write commands and states of the plan by a solution z, from yaw `psi`.
+def plan(
+    kind: Packed, z: Array, solved: bool, psi: float, moments: int, commands: Array, states: Array
+) -> tuple[bool, bool, int]:
+    """Write commands and states of the plan by a solution z, from yaw `psi`; the motion of the first `moments` alone.
 
     Unless `solved`, z becomes the unconstrained minimum; without one within all limits, there is no plan. Return
     whether z is within the rotor limits, whether beyond a soft limit, and the plan's active bounds.
@@ -288,11 +290,11 @@ def plan(kind: Packed, z: Array, solved: bool, psi: float, commands: Array, stat
             return False, False, 0
         if exceeds(kind[0].work.motion, kind[0].work.responses, z, problem):
             return True, True, 0
-    return True, False, _read(kind[0], z, psi, commands, states)
+    return True, False, _read(kind[0], z, psi, moments, commands, states)
 
 
 @inlined
-def _read(kind: QpKind, z: Array, psi: float, commands: Array, states: Array) -> int:
+def _read(kind: QpKind, z: Array, psi: float, moments: int, commands: Array, states: Array) -> int:
     """Write the plan by z; return its active bounds."""
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
     corrections = work.corrections[1:].copy()
@@ -305,24 +307,25 @@ def _read(kind: QpKind, z: Array, psi: float, commands: Array, states: Array) ->
             if z[k] <= qp.lower[k] + _BINDING or z[k] >= qp.upper[k] - _BINDING:
                 binding += 1
     _correct(work.commands, corrections, starts, commands)
-    _read_states(work.motion, work.speeds, work.responses, z, work.levels, psi, states)
+    _read_motion(work.motion, work.responses, z, psi, moments, work.levels, states)
+    _read_speeds(work.speeds, z, work.levels, states)
     return binding
 
 
 @inlined
-def _read_states(
-    motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
+def _read_motion(
+    motion: Array, responses: Array, z: Array, psi: float, moments: int, levels: Array, states: Array
 ) -> None:
-    """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
+    """Write the motion of the first `moments` states by z, yaw unwrapped from `psi` on; that of the others is nan."""
     inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
-    for step in range(motion.shape[0]):
-        x, X, state, blocks = motion[step], responses[step], states[step], levels.shape[0]
-        while blocks > 0 and levels[blocks - 1, step] == 0.0:  # not begun
-            blocks -= 1
+    rotors = states.shape[1] - PREDICTED
+    states[moments:, :PREDICTED] = nan
+    for step in range(moments):
+        x, X, state, blocks = motion[step], responses[step], states[step], _begun(levels, step)
         for part in range(0, DEVIATIONS, 4):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for block in range(blocks):
-                for k in range(inputs * block, inputs * block + speeds.shape[1]):  # four sums: none waits for another
+                for k in range(inputs * block, inputs * block + rotors):  # four sums: none waits for another
                     a += X[part, k] * z[k]
                     b += X[part + 1, k] * z[k]
                     c += X[part + 2, k] * z[k]
@@ -344,10 +347,27 @@ def _read_states(
         state[6], state[7], state[8] = phi, theta, psi
         for i in range(3):
             state[9 + i] = x[10 + i] + change[RATE + i]
+
+
+@inlined
+def _read_speeds(speeds: Array, z: Array, levels: Array, states: Array) -> None:
+    """Write the squared rotor speeds after the `PREDICTED` states by z."""
+    inputs = z.shape[0] // levels.shape[0]
+    for step in range(speeds.shape[0]):
+        state, blocks = states[step], _begun(levels, step)
         for rotor in range(speeds.shape[1]):
-            state[12 + rotor] = speeds[step, rotor]
+            state[PREDICTED + rotor] = speeds[step, rotor]
             for block in range(blocks):
-                state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
+                state[PREDICTED + rotor] += levels[block, step] * z[inputs * block + rotor]
+
+
+@inlined
+def _begun(levels: Array, step: int) -> int:
+    """Return how many blocks have begun before the end of a step."""
+    blocks = levels.shape[0]
+    while blocks > 0 and levels[blocks - 1, step] == 0.0:
+        blocks -= 1
+    return blocks
 
 
 @inlined
