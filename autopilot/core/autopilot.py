@@ -51,8 +51,9 @@ class Stages(Protocol):
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
 
-    def repeat(self, now_us: int, /) -> ActuatorCommand | None:
-        """Enter a frame between two control samples by its time alone; None if its content matters."""
+    @property
+    def repeats(self) -> bool:
+        """Whether frames between two control samples need no more than their time."""
 
     def wait(self, now_us: int, /) -> None: ...
 
@@ -128,15 +129,14 @@ class Autopilot(Generic[StagesT]):
         """Whether the frame of a time is a control sample."""
         return self.stages.loop.is_due(time_us)
 
-    def repeat(self, now_us: int) -> Step | None:
-        """Answer a frame between two control samples without its content; None if that matters."""
+    def next_us(self, now_us: int) -> int:
+        """Return the time of the next frame after a control sample whose content matters."""
         stages = self.stages
-        before_us = stages.time_us
-        continues = before_us is not None and 0 < now_us - before_us <= self._longest_us
-        if not continues or stages.loop.is_due(now_us):
-            return None
-        command = stages.repeat(now_us)
-        return None if command is None else Step(command, None, 0.0, delay_us=stages.delay.delay_us)
+        return now_us + (stages.loop.control_interval_us if stages.repeats else self.frame_interval_us)
+
+    def go_on(self, now_us: int) -> None:
+        """Go on to the frame of a time before `next_us`, without its content."""
+        self.stages.time_us = now_us
 
     def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
         return self.stages.serve(inbox)

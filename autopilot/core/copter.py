@@ -87,6 +87,8 @@ class Copter:
         self.waiting_us: int | None = None
         self._settles_by_us = 0
 
+    repeats = False
+
     @property
     def mode(self) -> str:
         return str(self.pilot.state.mode)
@@ -113,9 +115,6 @@ class Copter:
         if battery.exists:
             self.loop.know_charge(battery.used_ah)
         self.parts.battery.receive(battery)
-
-    def repeat(self, _now_us: int) -> ActuatorCommand | None:
-        return None
 
     def wait(self, now_us: int) -> None:
         """Deny commands before the first estimate; after a flight, prepare the next one."""

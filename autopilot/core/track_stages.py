@@ -85,11 +85,9 @@ class TrackStages:
         self.state_source.receive(frame)
         return self.state_source.state() if now else self.state_source.last
 
-    def repeat(self, now_us: int) -> ActuatorCommand | None:
-        if self.state_source.estimates:
-            return None
-        self.time_us = now_us
-        return self.actuate(now_us)
+    @property
+    def repeats(self) -> bool:
+        return not self.state_source.estimates
 
     def wait(self, _now_us: int) -> None:
         self.time_us = None

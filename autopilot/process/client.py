@@ -59,20 +59,19 @@ class PlantClient:
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            step, ahead_us = self._answered(autopilot, received[0]) if received else (None, [])
+            step, ahead_us = self._answered(autopilot, received[0]) if received else (None, range(0))
             self._send()
             due_s = self._end.poll(perf_counter())
             self._send()
             if step:  # while the plant integrates
-                repeated = [each for time_us in ahead_us if (each := autopilot.repeat(time_us)) is not None]
+                if ahead_us:
+                    autopilot.go_on(ahead_us[-1])
                 if self._ground is None:
                     autopilot.serve()
                 self._frame_came = True
                 self._report_if_unknown(step)
                 datagram = received[0] if received and isinstance(self._end, AutopilotEnd) else None
-                self._keep(AutopilotLog.write, step, datagram)
-                for each in repeated:
-                    self._keep(AutopilotLog.write, each, b"")
+                self._keep(AutopilotLog.write, step, datagram, ahead_us)
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
@@ -83,24 +82,25 @@ class PlantClient:
         self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> tuple[Step | None, list[int]]:
+    def _answered(self, autopilot: Autopilot[Any], datagram: bytes) -> tuple[Step | None, range]:
         """Answer a datagram, and without ground stations the frames up to the next control sample.
 
-        Return the times of these frames, too: those that need no more than their time are to be flown.
+        Return the times of those that will not come.
         """
         now_s, end, interval_us = perf_counter(), self._end, autopilot.frame_interval_us
         if self._ground is not None or not isinstance(end, AutopilotEnd):
-            return answer(end, autopilot.step, datagram, now_s), []
+            return answer(end, autopilot.step, datagram, now_s), range(0)
         received = end.receive(datagram, now_s)
         if received is None:
-            return None, []
+            return None, range(0)
         step = autopilot.step(received.frame, received.plant_status)
-        ahead_us, time_us = list[int](), step.command.time_us + interval_us
-        while step.decision is not None and end.may_answer_ahead(time_us) and not autopilot.is_due(time_us):
-            ahead_us.append(time_us)
-            time_us += interval_us
-        end.answer(step.command._replace(frames=1 + len(ahead_us)) if ahead_us else step.command, step.faults)
-        return step, ahead_us
+        now_us, frames = step.command.time_us, 1
+        if step.decision is not None:
+            while end.may_answer_ahead(time_us := now_us + frames * interval_us) and not autopilot.is_due(time_us):
+                frames += 1
+        end.answer(step.command._replace(frames=frames) if frames > 1 else step.command, step.faults)
+        next_us = min(autopilot.next_us(now_us), now_us + frames * interval_us)
+        return step, range(now_us + interval_us, next_us, interval_us)
 
     def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
         """Write to the log, whose failure ends only flights without ground stations."""

@@ -58,10 +58,11 @@ class AutopilotLog:
         self._status_us, self._thinning = -1, Thinning()
         self._fallback: Fallback | None = None
 
-    def write(self, step: Step, datagram: bytes | None = None) -> None:
+    def write(self, step: Step, datagram: bytes | None = None, repeated_us: Iterable[int] = ()) -> None:
         """Append a control sample; between samples, only command and filter check.
 
-        The `datagram` is empty where only the state was sent, and None in a replay.
+        The `datagram` is empty where only the state was sent, and None in a replay; `repeated_us` has the times of
+        later frames with the same command.
         """
         time_us, decision, estimate = step.command.time_us, step.decision, step.estimate
         if time_us < self._time_us:
@@ -71,7 +72,7 @@ class AutopilotLog:
             self._fallback, self._begins = None, True
         self._time_us = time_us
         if self.topics.for_viewers:
-            self._write_input(step.command, datagram)
+            self._write_input(step.command, datagram, repeated_us)
         if estimate is not None and estimate.check is not None:
             self.topics.add(FILTER, self._check_row(estimate.check))
         if decision is None:
@@ -142,7 +143,7 @@ class AutopilotLog:
     def close(self) -> None:
         self.topics.close()
 
-    def _write_input(self, command: ActuatorCommand, datagram: bytes | None) -> None:
+    def _write_input(self, command: ActuatorCommand, datagram: bytes | None, repeated_us: Iterable[int]) -> None:
         """Write the inputs of a replay; frames of states follow from the truth."""
         time_us = command.time_us
         if self._begins:
@@ -155,9 +156,10 @@ class AutopilotLog:
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
             self.topics.queue(encode_input(time_us, RecordKind.FRAME, datagram))
         first, others = split(command.controls)
-        self.topics.add(COMMAND, (time_us, *first, command.armed))
-        if others:
-            self.topics.add(MORE_COMMAND, (time_us, *others))
+        for each_us in (time_us, *repeated_us):
+            self.topics.add(COMMAND, (each_us, *first, command.armed))
+            if others:
+                self.topics.add(MORE_COMMAND, (each_us, *others))
 
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
         setup = self._setup

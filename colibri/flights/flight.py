@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar
 from colibri.autopilot.core.autopilot import Autopilot, Stages
 from colibri.autopilot.core.step import Received, Step, answer
 from colibri.common.records import Record
-from colibri.common.types import Address, PerRotor
+from colibri.common.types import Address, Array
 from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
@@ -35,8 +35,9 @@ Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 """Records frames of MAVLink: (simulated time in µs, frames)."""
 
 
-Answered: TypeAlias = tuple[Step, ActuatorCommand, Sequence[Fault | WorldChange], bytes | None]
-"""Step, command and faults as they reached the plant, and the datagram: empty if only rounded, `None` on `Direct`."""
+Answered: TypeAlias = tuple[Step, ActuatorCommand, Sequence[Fault | WorldChange], bytes | None, int]
+"""Step, command and faults as they reached the plant; the datagram, empty if only rounded, `None` on `Direct`; and the
+time of the next frame that must be exchanged, µs."""
 
 
 class Wire(Protocol):
@@ -44,13 +45,14 @@ class Wire(Protocol):
 
 
 class FrameSample(Record, frozen=True):
-    """A frame that was flown; `world` is at the time of the next one."""
+    """A frame that was flown, or several with the same command; `world` is at the time of the next one."""
 
     step: Step
     command: ActuatorCommand
     world: World
     datagram: bytes | None
     to_stations: "list[Outgoing]"
+    flown: Array  # truth after each frame, see `physics.frames`
 
 
 class SteppedFlight(Generic[StagesT]):
@@ -63,17 +65,26 @@ class SteppedFlight(Generic[StagesT]):
     def time_us(self) -> int:
         return self.plant.world.time_us
 
-    def step(self, inbox: Iterable[Received] = ()) -> FrameSample:
-        """Fly a frame, and serve ground stations, which sent `inbox`; DecisionError or IntegrationError."""
-        step, command, faults, datagram = self.wire.exchange(self.plant, self.autopilot)
-        self.plant.answer(command, faults)
-        return FrameSample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
+    def step(self, inbox: Iterable[Received] = (), until_us: int = 0) -> FrameSample:
+        """Fly a frame, or up to `until_us` those that repeat its command, and serve stations, which sent `inbox`.
+
+        Raises:
+            DecisionError, IntegrationError: Autopilot or plant cannot go on.
+        """
+        plant = self.plant
+        step, command, faults, datagram, next_us = self.wire.exchange(plant, self.autopilot)
+        now_us, interval_us = plant.world.time_us, plant.interval_us
+        plant.answer(command, faults, max(1, (min(next_us, until_us) - now_us) // interval_us))
+        world, flown = plant.world, plant.flown
+        if len(flown) > 1:
+            self.autopilot.go_on(world.time_us - interval_us)
+        return FrameSample(step, command, world, datagram, self.autopilot.serve(inbox), flown)
 
     def samples(self, duration_s: float) -> Iterator[FrameSample]:
         """Fly whole frames up to `duration_s` since time 0."""
-        end_us = duration_s * 1e6 - self.plant.interval_us
-        while self.plant.world.time_us <= end_us:
-            yield self.step()
+        end_us = int(duration_s * 1e6)
+        while self.plant.world.time_us + self.plant.interval_us <= end_us:
+            yield self.step(until_us=end_us)
 
     def snapshot(self) -> ObjectSnapshot:
         """Keep the state of plant, autopilot and wire; vehicle, profile and track are shared."""
@@ -88,7 +99,7 @@ class Direct:
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         step = autopilot.step(*plant.measure())
-        return step, step.command, step.faults, None
+        return step, step.command, step.faults, None, 0
 
 
 def direct_flight(
@@ -116,8 +127,7 @@ class InMemory:
     ) -> None:
         self._traffic = traffic
         self._encodes = replayed and feedback is Feedback.SENSORS
-        self._uncounted = 0  # frames since the last one that both ends have counted
-        self._controls: tuple[PerRotor, PerRotor] = ((), ())  # of the last command, as sent and as received
+        self._counted_us = -frame_interval_us  # time of the last frame that both ends have counted
         self.plant_end = PlantEnd(
             system_id=SYSTEM_ID,
             frame_interval_us=frame_interval_us,
@@ -133,53 +143,46 @@ class InMemory:
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         now_us = plant.world.time_us
-        with_battery = now_us % BATTERY_EVERY_US == 0
-        if not (with_battery or plant.has_news or self._traffic):
-            repeated = autopilot.repeat(now_us)
-            if repeated is not None:
-                self._uncounted += 1
-                return repeated, self._as_received(repeated.command), (), b""
-        frame, plant_status = plant.measure(with_battery=with_battery)
+        frame, plant_status = plant.measure(with_battery=now_us % BATTERY_EVERY_US == 0)
         received, datagram = None, b""
         if plant_status is NOTHING and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
             received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)
         if received is not None:
             step = autopilot.step(received)
             if not step.faults:
-                self._uncounted += 1
                 if self._encodes and isinstance(frame, SensorFrame):
                     datagram = self.plant_end.encoded(frame)
-                return step, self._as_received(step.command), (), datagram
-            self._count(now_us)
+                command = command_as_received(step.command)
+                assert command is not None, "a control law's command is one that rotors can follow"
+                return step, command, (), datagram, self._next_us(plant, autopilot, step)
+            self.autopilot_end.follow(now_us, self._count_before(now_us, plant.interval_us))
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()
             self.autopilot_end.answer(step.command, step.faults)
         else:
-            if self._uncounted:
-                self._count(now_us - plant.interval_us)
+            if passed := self._count_before(now_us, plant.interval_us):
+                self.autopilot_end.follow(now_us - plant.interval_us, passed)
             self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
             answered, datagram = self._to_autopilot(now_us, autopilot)
             assert answered is not None, "the autopilot answers every new frame"
             step = answered
         awaited = self._to_plant(now_us)
         assert awaited is not None, "the answer names the frame awaited"
-        return step, awaited, self.plant_end.take_faults(), datagram
+        return step, awaited, self.plant_end.take_faults(), datagram, 0
 
-    def _count(self, time_us: int) -> None:
-        """Count the frames up to one that came without a datagram."""
-        self.autopilot_end.follow(time_us, self._uncounted)
-        if not self._encodes:
-            self.plant_end.skip(self._uncounted)
-        self._uncounted = 0
+    def _next_us(self, plant: Plant, autopilot: Autopilot[Any], step: Step) -> int:
+        """Return the time of the next frame that must be exchanged."""
+        now_us = step.command.time_us
+        if step.decision is None or plant.has_news:
+            return 0
+        return min(autopilot.next_us(now_us), now_us - now_us % BATTERY_EVERY_US + BATTERY_EVERY_US)
 
-    def _as_received(self, command: ActuatorCommand) -> ActuatorCommand:
-        controls = command.controls
-        if controls == self._controls[0]:  # repeated, as between two control samples
-            return ActuatorCommand(command.time_us, self._controls[1], command.armed)
-        received = command_as_received(command)
-        assert received is not None, "a control law's command is one that rotors can follow"
-        self._controls = (controls, received.controls)
-        return received
+    def _count_before(self, now_us: int, interval_us: int) -> int:
+        """Have the plant's end count the frames before this one that came without a datagram; return how many."""
+        frames, self._counted_us = (now_us - self._counted_us) // interval_us - 1, now_us
+        if frames and not self._encodes:
+            self.plant_end.skip(frames)
+        return frames
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
         return datagrams

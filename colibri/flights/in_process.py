@@ -44,10 +44,11 @@ def fly_locally(
         with gc_frozen():
             began_s = perf_counter()
             for sample in SteppedFlight(plant, autopilot, wire).samples(plan.spec.duration):
-                log.write(sample.step, sample.datagram)
-                truth.write_world(sample.world)
-                frames += 1
-                time_s = sample.world.time_us / 1e6
+                now_us, next_us = sample.command.time_us, sample.world.time_us
+                log.write(sample.step, sample.datagram, range(now_us + plant.interval_us, next_us, plant.interval_us))
+                truth.write(sample.flown)
+                frames += len(sample.flown)
+                time_s = next_us / 1e6
                 progress(time_s)
                 if is_paced:
                     sleep(max(0.0, began_s + time_s / pace - perf_counter()))

@@ -14,7 +14,7 @@ from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Message
 
-_NOTHING = range(0)
+_NO_TIMES = range(0)
 _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
@@ -33,7 +33,7 @@ class AutopilotEnd(AnsweringEnd):
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._kind: int | None = None  # of the plant
         self._is_plain = False  # whether the last frame came alone
-        self._answered_us = _NOTHING  # times of the frames of the last answer that need no other one
+        self._answered_us = _NO_TIMES  # times of the frames of the last answer that need no other one
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Return the datagram's frame if it is the next one to compute."""
@@ -137,7 +137,7 @@ class AutopilotEnd(AnsweringEnd):
         self._received_s = now_s
         self._time_us = frame.time_us
         if frame.time_us not in self._answered_us:
-            self._answer, self._answered_us = None, _NOTHING
+            self._answer, self._answered_us = None, _NO_TIMES
         return frame
 
     def _follows(self, time_us: int, before_us: int) -> bool:

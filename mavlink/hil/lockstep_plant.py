@@ -114,9 +114,19 @@ class PlantEnd:
     def ahead(self, time_us: int) -> ActuatorCommand | None:
         """Return the command of a later frame if the last one answers it, too."""
         last = self._accepted
-        if last is None or not 0 < time_us - last.time_us < last.frames * self.frame_interval_us:
+        if last is None or not last.time_us < time_us < self._answered_until_us(last):
             return None
         return ActuatorCommand(time_us, last.controls, last.armed)
+
+    def next_us(self, time_us: int) -> int:
+        """Return the time of the next frame that must be sent."""
+        if self._accepted is None or self.feedback is Feedback.SENSORS:
+            return 0
+        battery_us = time_us - time_us % lockstep.BATTERY_EVERY_US + lockstep.BATTERY_EVERY_US
+        return min(self._answered_until_us(self._accepted), battery_us)
+
+    def _answered_until_us(self, command: ActuatorCommand) -> int:
+        return command.time_us + command.frames * self.frame_interval_us
 
     def _receive_any(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         command: ActuatorCommand | None = None

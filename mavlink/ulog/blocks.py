@@ -19,9 +19,9 @@ class Thinning:
     """Picks the first sample of each `EVERY_US` of simulated time: the same in every log of a flight."""
 
     def __init__(self) -> None:
-        self._before_us: int | None = None
+        self._before_us: float | None = None
 
-    def is_due(self, time_us: int) -> bool:
+    def is_due(self, time_us: float) -> bool:
         before_us, self._before_us = self._before_us, time_us
         return time_us % EVERY_US == 0 if before_us is None else time_us // EVERY_US != before_us // EVERY_US
 

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.common.types import Array, PerRotor
-from colibri.mavlink.ulog.topics import head, message_layout, row_layout
+from colibri.mavlink.ulog.topics import head, message_layout
 
 _US_PER_S = 1e6
-_HEAD = Struct("<HBH")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,22 +50,17 @@ class Topic:
         return message_layout(self.fields)
 
     @cached_property
-    def head(self) -> bytes:
-        """Return the first bytes of each row's message."""
-        return _HEAD.pack(*head(self.layout, self.number))
-
-    @cached_property
     def pack(self) -> Struct:
-        """Return the layout of a row in its message: time, µs, and the columns."""
-        return row_layout(self.fields)
+        """Return the layout of a row as doubles."""
+        return Struct(f"<{len(self.names)}d")
 
-    def encode(self, rows: Array) -> bytes:
-        """Encode rows, (n, columns), with `t` in s; numbers beyond the range of a column become infinite, or wrap."""
-        encoded = np.zeros(len(rows), self.layout)
+    def encode(self, table: Array) -> bytes:
+        """Encode rows, (n, columns), time in µs; numbers beyond the range of a column become infinite, or wrap."""
+        encoded = np.zeros(len(table), self.layout)
         encoded["size"], encoded["kind"], encoded["number"] = head(self.layout, self.number)
-        encoded["timestamp"] = np.rint(rows[:, :1] * _US_PER_S)
+        encoded["timestamp"] = table[:, :1]
         for name, place in self._runs:
-            encoded[name] = rows[:, place]
+            encoded[name] = table[:, place]
         return encoded.tobytes()
 
     def decode(self, encoded: NDArray[np.void]) -> Array:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version as version_of_package
-from struct import error
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -58,17 +57,20 @@ class TopicLog:
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
         """Add a row: the time in µs, then the columns."""
         block = self._blocks.get(encoder) or self._begin_block(encoder)
-        try:
-            block.pack_into(block.memory, block.used + block.head_bytes, *row)
-        except (error, OverflowError):
-            if not isinstance(encoder, Topic):
-                raise
-            with np.errstate(all="ignore"):  # beyond the range of a column
-                encoded = encoder.encode(np.array([(row[0] / 1e6, *row[1:])]))
-            block.memory[block.used : block.used + block.row_bytes] = encoded
-        block.used += block.row_bytes
-        if block.used == len(block.memory):
+        block.pack_into(block.memory, block.used * block.row_bytes, *row)
+        block.used += 1
+        if block.used == encoder.block_rows:
             self._take(encoder, block)
+
+    def extend(self, encoder: RowEncoder, rows: Array) -> None:
+        """Add rows, (n, columns)."""
+        block = self._blocks.get(encoder) or self._begin_block(encoder)
+        while len(rows):
+            part = rows[: encoder.block_rows - block.used]
+            block.table[block.used : block.used + len(part)] = part
+            block.used, rows = block.used + len(part), rows[len(part) :]
+            if block.used == encoder.block_rows:
+                self._take(encoder, block)
 
     def queue(self, encoded: bytes) -> None:
         self._queued.append(encoded)
@@ -92,32 +94,27 @@ class TopicLog:
     def _take(self, encoder: RowEncoder, block: "_Block") -> None:
         self._append_queued()
         used, block.used = block.used, 0
-        self._keep(encoder, memoryview(block.memory)[:used])
+        with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a column
+            self._keep(encoder, encoder.encode(block.table[:used]))
 
     def _append_queued(self) -> None:
         queued, self._queued = self._queued, []
         if queued:
             self.append(messages.SYNC + b"".join(queued))
 
-    def _keep(self, encoder: RowEncoder, rows: memoryview) -> None:
-        if isinstance(encoder, Topic):
-            encoded = bytes(rows)
-        else:
-            table = np.frombuffer(rows).reshape(-1, encoder.pack.size // 8)
-            with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a single float
-                encoded = encoder.encode(table)
+    def _keep(self, _encoder: RowEncoder, encoded: bytes) -> None:
         self.append(messages.SYNC + encoded)
 
 
 class _Block:
     """Memory of rows that wait, packed at once: numbers kept as objects would spread over the caches."""
 
-    __slots__ = ("head_bytes", "memory", "pack_into", "row_bytes", "used")
+    __slots__ = ("memory", "pack_into", "row_bytes", "table", "used")
 
     def __init__(self, encoder: RowEncoder) -> None:
-        row = encoder.head + bytes(encoder.pack.size)
-        self.pack_into, self.head_bytes, self.row_bytes = encoder.pack.pack_into, len(encoder.head), len(row)
-        self.memory, self.used = bytearray(row * encoder.block_rows), 0
+        self.pack_into, self.row_bytes = encoder.pack.pack_into, encoder.pack.size
+        self.memory, self.used = bytearray(self.row_bytes * encoder.block_rows), 0
+        self.table: Array = np.frombuffer(self.memory).reshape(encoder.block_rows, -1)
 
 
 class FileLog(TopicLog):
@@ -166,8 +163,8 @@ class MemoryLog(TopicLog):
         for begin in range(0, len(rows), step):
             yield bytes(rows[begin : begin + step])
 
-    def _keep(self, encoder: RowEncoder, rows: memoryview) -> None:
+    def _keep(self, encoder: RowEncoder, encoded: bytes) -> None:
         if isinstance(encoder, Topic):
-            self._rows[encoder] += rows
+            self._rows[encoder] += encoded
         else:
-            super()._keep(encoder, rows)
+            super()._keep(encoder, encoded)

@@ -69,12 +69,7 @@ def record(topic: str, *numbers: float) -> bytes:
 
 @cache
 def _packer(topic: str) -> Callable[..., bytes]:
-    return row_layout(TOPICS[topic], "H").pack
-
-
-def row_layout(fields: str, first: str = "") -> Struct:
-    """Return the layout of a message's fields after `first`, in codes of `struct`."""
-    return Struct("<" + first + "".join(code * count for _, code, count in _fields(fields)))
+    return Struct("<H" + "".join(code * count for _, code, count in _fields(TOPICS[topic]))).pack
 
 
 def _fields(text: str) -> list[tuple[str, str, int]]:

@@ -1,6 +1,5 @@
 """Integrators of one frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4)."""
 
-from collections.abc import Callable
 from math import ceil, sqrt
 from typing import Literal, TypeAlias
 
@@ -11,7 +10,6 @@ from colibri.common.kernels import power
 from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close, close_attitude, hold, write_derivative
 
-Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float, Array], tuple[float, bool]]  # as `fixed_step`
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
 RK4_STEP_S = 0.001
@@ -52,10 +50,6 @@ def adaptive_step(
     """Integrate as `fixed_step` by Dormand-Prince; False also if the step size underflows."""
     voltage_v, done = dormand_prince(start, target, parameters, duration_s, x)
     return voltage_v, close_attitude(x) and done
-
-
-def solver(name: Integrator) -> Solver:
-    return adaptive_step if name == "adaptive" else fixed_step
 
 
 @compiled

@@ -14,16 +14,16 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.random_streams import Noise
 from colibri.plant.environment.turbulence import CALM, Air, Eddies
 from colibri.plant.environment.weather import NO_WEATHER, RecordedWind, Weather, Wind
-from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, PlantParameters, attitude_of, specific_force
-from colibri.plant.physics.integrators import Integrator, solver
+from colibri.plant.physics.equations import PlantParameters, attitude_of, specific_force
+from colibri.plant.physics.frames import OTHER_ROTORS, ROTORS, STATE, USED, VOLTAGE, WIND, frames_by, row_width
+from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import IntegrationError, Start, check_start
 from colibri.plant.vehicle.description import Vehicle
 
 State = tuple[float, ...]
 
 _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-_MOMENT_S = 1e-3
-_RIGID = len(STATE)
+_MOMENT_US = 1000
 
 
 class World(Record, frozen=True):
@@ -56,13 +56,15 @@ class Physics:
         self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
         self._wind = self._parameters["wind_enu_m_s"][0]
         self._noise = noise
-        self._integrate = solver(integrator)
+        self._advance = frames_by(integrator)
         self.become(vehicle)
         self._held: list[float | None] | None = None
         self._standing: PerRotor = (0.0,) * vehicle.rotors.count
         x = np.array((*_LEVEL, *self._standing, 0.0))
-        self._end: tuple[World | None, Array] = (None, x)
-        self._integrate(x, self._standing, self._parameters, _MOMENT_S, np.empty(x.size))
+        self._end: tuple[World | None, Array] = (None, x)  # the last world, and its x of `equations`
+        self._width = row_width(vehicle.rotors.count)
+        self.rows: Array = np.empty((1, self._width))  # of `frames`, flown by the last step
+        self._advance(x, self._standing, self._parameters, 0, _MOMENT_US, self.rows)
 
     def become(self, vehicle: Vehicle) -> None:
         """Fly another vehicle, in the same air."""
@@ -77,29 +79,35 @@ class Physics:
         """Whether neither air nor noise changes from step to step."""
         return self._air.steady is not None and self._noise is None
 
-    def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
-        """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
-        time_us, wind = world.time_us, self._air.steady
+    def step(self, world: World, command: ActuatorCommand, interval_us: int, count: int = 1) -> World:
+        """Advance by frames, at most `count` and one if not `is_steady`; their truth is in `rows`.
+
+        Raises:
+            IntegrationError: The state is not finite after the first one; a later one is not flown.
+        """
+        time_us, wind, eddies = world.time_us, self._air.steady, None
         if wind is None:
             self._wind[:] = world.wind_enu_m_s
         target = self._target(command)
         if self._noise is not None:
-            target = self._disturb(self._noise, target, time_us, duration_us)
-        start = self._vector(world)
-        x = np.empty(start.size)
-        voltage_v, is_finite = self._integrate(start, target, self._parameters, duration_us * 1e-6, x)
-        if not is_finite:
+            target = self._disturb(self._noise, target, time_us, interval_us)
+        x, rows = self._vector(world), np.empty((count if self.is_steady else 1, self._width))
+        flown = self._advance(x, target, self._parameters, time_us, interval_us, rows)
+        if flown < len(rows):
+            rows = rows[:flown]
+        if not flown:
             when = f"at t = {time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
-        end = tuple(x.tolist())
-        state, eddies = end[:_RIGID], None
-        voltage_v = nan if self._battery is None else voltage_v
-        time_us += duration_us
+        row = rows[-1].tolist()
+        time_us += flown * interval_us
+        state = tuple(row[STATE:ROTORS])
         if wind is None:
-            velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
-            wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
-        after = World(time_us, state, end[ROTORS], end[CHARGE], voltage_v, wind, eddies)
-        self._end = (after, x)
+            velocity = earth_from_body(attitude_of(state), (state[0], state[1], state[2]))
+            wind, eddies = self._air.go_on(world.eddies, time_us, state[8], velocity, interval_us)
+            rows[-1, WIND:OTHER_ROTORS] = wind
+        speeds = tuple(row[ROTORS:VOLTAGE] + row[OTHER_ROTORS:])[: len(self._standing)]
+        after = World(time_us, state, speeds, row[USED], row[VOLTAGE], wind, eddies)
+        self.rows, self._end = rows, (after, x)
         return after
 
     def specific_force(self, world: World) -> Vector:

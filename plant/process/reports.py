@@ -8,12 +8,15 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.common.process.log_files import set_aside
 from colibri.common.process.shared_log import SharedLog, remove_unused
 from colibri.common.process.status import Status
+from colibri.common.types import Array
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import MORE_TRUTH, TRUTH, split
@@ -92,13 +95,20 @@ class TruthLog:
             self._blocks = TruthBlocks(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count)
 
     def write_world(self, world: World) -> None:
-        time_us, (speeds, others) = world.time_us, split(world.rotor_speeds)
-        row = (time_us, *world.state, *speeds, world.voltage_v, world.charge_used_ah, *world.wind_enu_m_s)
-        self._log.add(TRUTH, row)
-        if others:
-            self._log.add(MORE_TRUTH, (time_us, *others))
-        if self._blocks and self._thinning.is_due(time_us):
-            self._log.add(self._blocks, (*row, *others))
+        speeds, others = split(world.rotor_speeds)
+        known = (*world.state, *speeds, world.voltage_v, world.charge_used_ah, *world.wind_enu_m_s, *others)
+        self.write(np.array([(world.time_us, *known)]))
+
+    def write(self, rows: Array) -> None:
+        """Write rows of `physics.frames`."""
+        log, columns = self._log, len(TRUTH.names)
+        log.extend(TRUTH, rows[:, :columns])
+        if rows.shape[1] > columns:
+            log.extend(MORE_TRUTH, np.concatenate([rows[:, :1], rows[:, columns:]], axis=1))
+        if self._blocks:
+            for row, time_us in enumerate(rows[:, 0].tolist()):
+                if self._thinning.is_due(time_us):
+                    log.extend(self._blocks, rows[row : row + 1])
 
 
 class PlantLogs:
@@ -125,6 +135,9 @@ class PlantLogs:
 
     def write_world(self, world: World) -> None:
         self._truth.write_world(world)
+
+    def write_truth(self, rows: Array) -> None:
+        self._truth.write(rows)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         if self._tlog:

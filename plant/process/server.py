@@ -1,7 +1,7 @@
 """The plant on a link, in lockstep or at the pace of the wall clock, like hardware."""
 
 from collections.abc import Callable, Iterable
-from math import isfinite
+from math import inf, isfinite
 from time import perf_counter, sleep
 from typing import Any, TypeVarTuple
 
@@ -9,6 +9,7 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
+from colibri.common.types import Array
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
@@ -18,7 +19,7 @@ from colibri.mavlink.hil.world_changes import PaceChange, WorldChange
 from colibri.mavlink.links.udp import UdpLink, is_bound
 from colibri.plant.events import check_events
 from colibri.plant.physics.start import default_starts, nudged
-from colibri.plant.physics.world import World, state_frame
+from colibri.plant.physics.world import state_frame
 from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, PlantLogs, Silence, closing, report_end
 from colibri.plant.sensors.suite import served_by
 from colibri.plant.simulation.plant import Plant, PlantBuilder
@@ -65,9 +66,8 @@ class Server:
     ) -> None:
         self._link, self._end, self._status, self._stop, self._logs = link, end, status, stop, logs
         self._streams_truth = streams_truth
-        self._time_us = 0
-        self._logged: World | None = None
-        self._passed: list[World] = []  # not logged yet
+        self._time_us, self._end_us = 0, inf
+        self._unlogged: list[Array] = []  # rows of the truth
         self._ends = True
         self._progress, self._began_s = Progress(status), 0.0
         self._silence = Silence(status, SILENT_AFTER_S, "the autopilot answers again", 0.0)
@@ -80,14 +80,15 @@ class Server:
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
         self._ends = isfinite(duration_s)
         self._began_s = began_s = perf_counter()
-        pace, frames = FramePacer(speed, began_s), 0
-        while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
+        pace, frames, self._end_us = FramePacer(speed, began_s), 0, duration_s * 1e6
+        self._keep(PlantLogs.write_world, plant.world)
+        while not self._stop and plant.world.time_us + plant.interval_us <= self._end_us:
             if not self._advance(plant, pace):
                 break
-            frames += 1
+            frames += len(plant.flown)
+            self._unlogged.append(plant.flown)
         self._log_traffic([])
-        self._log_passed()
-        self._log(plant.world)
+        self._log_truth()
         self._keep(PlantLogs.flush)
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
         text, own = self._own_figures()
@@ -107,7 +108,9 @@ class Server:
         asked = self._end.take_faults()
         if asked:
             pace.change(asked, plant.world.time_us, perf_counter())
-        plant.answer(command, asked)
+        now_us, interval_us = plant.world.time_us, plant.interval_us
+        plant.answer(command, asked, max(1, int(min(self._end.next_us(now_us), self._end_us) - now_us) // interval_us))
+        self._end.skip(len(plant.flown) - 1)
         return True
 
     def _ahead(self, plant: Plant) -> ActuatorCommand | None:
@@ -120,7 +123,6 @@ class Server:
             self._offer(plant)
         else:
             self._end.skip()
-            self._passed.append(plant.world)
         return command
 
     def _offer(self, plant: Plant) -> float:
@@ -133,8 +135,7 @@ class Server:
         self._log_traffic([])  # while the autopilot computes
         self._time_us = world.time_us
         self._log_traffic(sent)
-        self._log_passed()
-        self._log(world)
+        self._log_truth()
         self._progress.report(world.time_us / 1e6, now_s - self._began_s)
         plant.foresee()
         return now_s
@@ -153,15 +154,10 @@ class Server:
             self._silence.lasts(now_s, "no answer", plant.world.time_us, ", waiting for the autopilot")
         return None
 
-    def _log(self, world: World) -> None:
-        if world is not self._logged:
-            self._keep(PlantLogs.write_world, world)
-        self._logged = world
-
-    def _log_passed(self) -> None:
-        passed, self._passed = self._passed, []
-        for world in passed:
-            self._log(world)
+    def _log_truth(self) -> None:
+        unlogged, self._unlogged = self._unlogged, []
+        for rows in unlogged:
+            self._keep(PlantLogs.write_truth, rows)
 
     def _keep(self, write: Callable[[PlantLogs, *Ts], None], *args: *Ts) -> None:
         """Write to the logs; an endless flight goes on without a log that cannot be written."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
+from colibri.common.types import Array
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus
@@ -124,12 +125,13 @@ class Plant:
         self._results: tuple[FaultResult, ...] = ()
         self._may_foresee = latency_us == 0 and physics.is_steady
         self._repeated, self._repeats_after = False, {False: False, True: False}
-        self._foreseen: World | None = None
+        self._foreseen: tuple[World, Array] | None = None
+        self.flown = physics.rows  # truth after each frame of the last answer, see `physics.frames`
 
     @property
     def has_news(self) -> bool:
-        """Whether a frame without battery has a status, too."""
-        return bool(self._results or self._actuation.delay_us)
+        """Whether a frame without battery may have a status, too."""
+        return bool(self._results or self._actuation.delay_us or self._round_trip_us)
 
     def measure(self, *, with_battery: bool = True) -> tuple[Frame, PlantStatus]:
         battery = self._physics.battery(self.world) if with_battery else None
@@ -138,7 +140,8 @@ class Plant:
         status = NOTHING if alone else PlantStatus(battery, self._results, delay_us)
         return self._measure(self.world), status
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = (), frames: int = 1) -> None:
+        """Fly on with `command` for one frame, or for some of several `frames` that need not be measured."""
         self._results = ()
         if faults:
             self.inject(faults)
@@ -146,7 +149,7 @@ class Plant:
         repeated = command.controls == before.controls and command.armed == before.armed
         self._repeats_after[self._repeated] = self._repeated = repeated
         if foreseen is not None and repeated:
-            self._actuation.now, self.world = command, foreseen
+            self._actuation.now, (self.world, self.flown) = command, foreseen
         elif self._round_trip_us:
             self.arrive(self.world.time_us, command)
             self.go_on()
@@ -154,13 +157,18 @@ class Plant:
             self._actuation.now, self._actuation.delay_us = command, 0
             if self.world.time_us >= self._next_us:
                 self._happen()
-            self.world = self._physics.step(self.world, command, self.interval_us)
+            if frames > 1:
+                until_event = -(-(self._next_us - self.world.time_us) // self.interval_us)
+                frames = 1 if self._results else min(frames, until_event)
+            self.world = self._physics.step(self.world, command, self.interval_us, frames)
+            self.flown = self._physics.rows
 
     def foresee(self) -> None:
         """Integrate the next frame before its command comes, if that is likely to repeat the last one."""
         if self._repeats_after[self._repeated] and self.world.time_us < self._next_us and self._may_foresee:
             with suppress(IntegrationError):
-                self._foreseen = self._physics.step(self.world, self._actuation.now, self.interval_us)
+                foreseen = self._physics.step(self.world, self._actuation.now, self.interval_us)
+                self._foreseen = foreseen, self._physics.rows
 
     def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
         """Inject faults and changes of the world now; results of faults go with the next frame."""
@@ -204,6 +212,7 @@ class Plant:
             self._happen()
         for command, duration_us in self._actuation.spans(begin_us, begin_us + self.interval_us):
             self.world = self._physics.step(self.world, command, duration_us)
+        self.flown = self._physics.rows
 
 
 class PlantBuilder:

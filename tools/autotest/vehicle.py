@@ -91,7 +91,7 @@ class Vehicle:
 
     def step(self) -> None:
         plant, pacer = self._plant, self._pacer
-        _, command, asked, _ = self._wire.exchange(plant, self._autopilot)
+        _, command, asked, *_ = self._wire.exchange(plant, self._autopilot)
         pacer.change(asked, plant.world.time_us, perf_counter())
         plant.answer(command, asked)
         self._listen()

@@ -188,9 +188,7 @@ class Mpc:
         commands, states = np.empty(self._commands), np.empty(self._states)
         started_s = self._clock()
         z: Array | None = qps.minimum
-        is_free, is_beyond, bounds = planning.plan(
-            qps.kind, qps.minimum, False, psi, self.moments, commands, states
-        )
+        is_free, is_beyond, bounds = planning.plan(qps.kind, qps.minimum, False, psi, self.moments, commands, states)
         status, iterations, slack, tilts, rates = QpStatus.SOLVED, 0.0, 0.0, 0, 0
         if is_beyond or not is_free:
             status, z, iterations, slack, (tilts, rates) = self._solve(*qps, is_free=is_free)
@@ -201,9 +199,9 @@ class Mpc:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
         active = Active(bounds, 0, tilts, rates)
-        shown = (states, commands) if self.moments > self.horizon else (None, None)
+        shown, squared = (states, commands) if self.moments > self.horizon else (None, None)
         diagnostics = Diagnostics(
-            status, None, solve_time_s, 0.0, active, slack, *shown, mass_kg, path_lag_s, iterations
+            status, None, solve_time_s, 0.0, active, slack, shown, squared, mass_kg, path_lag_s, iterations
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics

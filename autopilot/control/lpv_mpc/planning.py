@@ -364,7 +364,7 @@ def _read_speeds(speeds: Array, z: Array, levels: Array, states: Array) -> None:
 @inlined
 def _begun(levels: Array, step: int) -> int:
     """Return how many blocks have begun before the end of a step."""
-    blocks = levels.shape[0]
+    blocks = len(levels)
     while blocks > 0 and levels[blocks - 1, step] == 0.0:
         blocks -= 1
     return blocks
