@@ -39,6 +39,7 @@ class Stages(Protocol):
     delay: DelayCompensation
     state_source: StateSource
     time_us: int | None  # of the last frame with a known state; None if the next one begins a flight
+    repeats: bool  # whether frames between two control samples need no more than their time
 
     @property
     def mode(self) -> str: ...
@@ -50,10 +51,6 @@ class Stages(Protocol):
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
-
-    @property
-    def repeats(self) -> bool:
-        """Whether frames between two control samples need no more than their time."""
 
     def wait(self, now_us: int, /) -> None: ...
 

@@ -67,6 +67,7 @@ class TrackStages:
         start_speed: float,
     ) -> None:
         self.loop, self.delay, self.state_source = loop, delay, state_source
+        self.repeats = not state_source.estimates
         self.time_us: int | None = None
         self._planner, self._start_speed = planner, start_speed
         self._acts_us: int | None = None
@@ -84,10 +85,6 @@ class TrackStages:
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         self.state_source.receive(frame)
         return self.state_source.state() if now else self.state_source.last
-
-    @property
-    def repeats(self) -> bool:
-        return not self.state_source.estimates
 
     def wait(self, _now_us: int) -> None:
         self.time_us = None

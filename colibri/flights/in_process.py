@@ -46,7 +46,7 @@ def fly_locally(
             for sample in SteppedFlight(plant, autopilot, wire).samples(plan.spec.duration):
                 now_us, next_us = sample.command.time_us, sample.world.time_us
                 log.write(sample.step, sample.datagram, range(now_us + plant.interval_us, next_us, plant.interval_us))
-                truth.write(sample.flown)
+                truth.write(sample.flown, next_us)
                 frames += len(sample.flown)
                 time_s = next_us / 1e6
                 progress(time_s)

@@ -21,6 +21,11 @@ class Thinning:
     def __init__(self) -> None:
         self._before_us: float | None = None
 
+    @property
+    def next_us(self) -> float:
+        """Return a time before which no sample is due."""
+        return 0.0 if self._before_us is None else (self._before_us // EVERY_US + 1) * EVERY_US
+
     def is_due(self, time_us: float) -> bool:
         before_us, self._before_us = self._before_us, time_us
         return time_us % EVERY_US == 0 if before_us is None else time_us // EVERY_US != before_us // EVERY_US

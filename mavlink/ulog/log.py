@@ -65,12 +65,13 @@ class TopicLog:
     def extend(self, encoder: RowEncoder, rows: Array) -> None:
         """Add rows, (n, columns)."""
         block = self._blocks.get(encoder) or self._begin_block(encoder)
-        while len(rows):
-            part = rows[: encoder.block_rows - block.used]
-            block.table[block.used : block.used + len(part)] = part
-            block.used, rows = block.used + len(part), rows[len(part) :]
-            if block.used == encoder.block_rows:
-                self._take(encoder, block)
+        while (end := block.used + len(rows)) >= encoder.block_rows:
+            left = encoder.block_rows - block.used
+            block.table[block.used :] = rows[:left]
+            block.used, rows = encoder.block_rows, rows[left:]
+            self._take(encoder, block)
+        block.table[block.used : end] = rows
+        block.used = end
 
     def queue(self, encoded: bytes) -> None:
         self._queued.append(encoded)

@@ -91,22 +91,23 @@ class Physics:
         target = self._target(command)
         if self._noise is not None:
             target = self._disturb(self._noise, target, time_us, interval_us)
-        x, rows = self._vector(world), np.empty((count if self.is_steady else 1, self._width))
+        x, rows = self._vector(world), np.empty((1 if wind is None or self._noise else count, self._width))
         flown = self._advance(x, target, self._parameters, time_us, interval_us, rows)
         if flown < len(rows):
             rows = rows[:flown]
         if not flown:
             when = f"at t = {time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
-        row = rows[-1].tolist()
         time_us += flown * interval_us
-        state = tuple(row[STATE:ROTORS])
+        row = rows[-1].tolist()
+        state, speeds = tuple(row[STATE:ROTORS]), row[ROTORS:VOLTAGE]
+        if self._width > OTHER_ROTORS:
+            speeds += row[OTHER_ROTORS:]
         if wind is None:
             velocity = earth_from_body(attitude_of(state), (state[0], state[1], state[2]))
             wind, eddies = self._air.go_on(world.eddies, time_us, state[8], velocity, interval_us)
             rows[-1, WIND:OTHER_ROTORS] = wind
-        speeds = tuple(row[ROTORS:VOLTAGE] + row[OTHER_ROTORS:])[: len(self._standing)]
-        after = World(time_us, state, speeds, row[USED], row[VOLTAGE], wind, eddies)
+        after = World(time_us, state, tuple(speeds[: len(self._standing)]), row[USED], row[VOLTAGE], wind, eddies)
         self.rows, self._end = rows, (after, x)
         return after
 

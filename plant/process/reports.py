@@ -28,6 +28,7 @@ from colibri.plant.physics.world import World
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_WAIT_S = 0.1  # between two checks whether the process shall end
+_COLUMNS = len(TRUTH.names)
 SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
 
 
@@ -97,18 +98,20 @@ class TruthLog:
     def write_world(self, world: World) -> None:
         speeds, others = split(world.rotor_speeds)
         known = (*world.state, *speeds, world.voltage_v, world.charge_used_ah, *world.wind_enu_m_s, *others)
-        self.write(np.array([(world.time_us, *known)]))
+        self.write(np.array([(world.time_us, *known)]), world.time_us)
 
-    def write(self, rows: Array) -> None:
-        """Write rows of `physics.frames`."""
-        log, columns = self._log, len(TRUTH.names)
-        log.extend(TRUTH, rows[:, :columns])
-        if rows.shape[1] > columns:
-            log.extend(MORE_TRUTH, np.concatenate([rows[:, :1], rows[:, columns:]], axis=1))
-        if self._blocks:
-            for row, time_us in enumerate(rows[:, 0].tolist()):
-                if self._thinning.is_due(time_us):
-                    log.extend(self._blocks, rows[row : row + 1])
+    def write(self, rows: Array, until_us: int) -> None:
+        """Write rows of `physics.frames`, the last of them of `until_us`."""
+        log = self._log
+        if rows.shape[1] > _COLUMNS:
+            log.extend(TRUTH, rows[:, :_COLUMNS])
+            log.extend(MORE_TRUTH, np.concatenate([rows[:, :1], rows[:, _COLUMNS:]], axis=1))
+        else:
+            log.extend(TRUTH, rows)
+        if self._blocks is not None and until_us >= self._thinning.next_us:
+            for row in rows:
+                if self._thinning.is_due(row[0]):
+                    log.extend(self._blocks, row[None])
 
 
 class PlantLogs:
@@ -136,8 +139,8 @@ class PlantLogs:
     def write_world(self, world: World) -> None:
         self._truth.write_world(world)
 
-    def write_truth(self, rows: Array) -> None:
-        self._truth.write(rows)
+    def write_truth(self, rows: Array, until_us: int) -> None:
+        self._truth.write(rows, until_us)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         if self._tlog:

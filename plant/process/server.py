@@ -67,7 +67,7 @@ class Server:
         self._link, self._end, self._status, self._stop, self._logs = link, end, status, stop, logs
         self._streams_truth = streams_truth
         self._time_us, self._end_us = 0, inf
-        self._unlogged: list[Array] = []  # rows of the truth
+        self._unlogged: list[tuple[Array, int]] = []  # rows of the truth, and the last one's time, µs
         self._ends = True
         self._progress, self._began_s = Progress(status), 0.0
         self._silence = Silence(status, SILENT_AFTER_S, "the autopilot answers again", 0.0)
@@ -86,7 +86,7 @@ class Server:
             if not self._advance(plant, pace):
                 break
             frames += len(plant.flown)
-            self._unlogged.append(plant.flown)
+            self._unlogged.append((plant.flown, plant.world.time_us))
         self._log_traffic([])
         self._log_truth()
         self._keep(PlantLogs.flush)
@@ -156,8 +156,8 @@ class Server:
 
     def _log_truth(self) -> None:
         unlogged, self._unlogged = self._unlogged, []
-        for rows in unlogged:
-            self._keep(PlantLogs.write_truth, rows)
+        for rows, until_us in unlogged:
+            self._keep(PlantLogs.write_truth, rows, until_us)
 
     def _keep(self, write: Callable[[PlantLogs, *Ts], None], *args: *Ts) -> None:
         """Write to the logs; an endless flight goes on without a log that cannot be written."""
