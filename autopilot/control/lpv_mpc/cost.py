@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VECTOR, VELOCITY
 from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
 from colibri.autopilot.control.qp import Qp
 from colibri.common.compiled_rotations import rotation_matrix
@@ -22,8 +22,6 @@ from colibri.common.matrices import put
 from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
-
-_VECTOR = 8  # numbers in the longest vectors of today's CPUs
 
 
 class CostWeights(NamedTuple):
@@ -108,7 +106,7 @@ def _blocks(starts: Integers, step: int) -> int:
 @inlined
 def _reach(k: int, columns: int) -> int:
     """Return how far row k of the symmetric H is computed: to its diagonal, in whole vectors of columns."""
-    return min((k // _VECTOR + 1) * _VECTOR, columns)
+    return min((k // VECTOR + 1) * VECTOR, columns)
 
 
 @inlined

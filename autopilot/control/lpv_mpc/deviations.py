@@ -18,6 +18,7 @@ from colibri.common.jit import Packed, compiled, inlined, opened, packed
 from colibri.common.types import Array
 
 DEVIATIONS = 12
+VECTOR = 8  # numbers in the longest vectors of today's CPUs
 POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
 
 
@@ -144,7 +145,7 @@ def respond(
         blocks = means.shape[0]
         while means[blocks - 1, step] == 0.0:  # not begun; without lag, those before have ended, too
             blocks -= 1
-        _advance(responses, step, T, model.interval_s)
+        _advance(responses, step, T, model.interval_s, inputs * blocks)
         X = responses[step + 1]
         for block in range(blocks):
             mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
@@ -159,7 +160,8 @@ def respond(
 
 
 @inlined
-def _advance(X: Array, n: int, T: StepTransition, h: float) -> None:
+def _advance(X: Array, n: int, T: StepTransition, h: float, begun: int) -> None:
+    """Advance the first `begun` columns, and others with them: whole vectors of columns."""
     for i in range(3):
         pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
         pw0, pw1, pw2 = T.position_rate[i, 0, n], T.position_rate[i, 1, n], T.position_rate[i, 2, n]
@@ -169,7 +171,7 @@ def _advance(X: Array, n: int, T: StepTransition, h: float) -> None:
         rr0, rr1, rr2 = T.rotation[i, 0, n], T.rotation[i, 1, n], T.rotation[i, 2, n]
         rw0, rw1, rw2 = T.rotation_rate[i, 0, n], T.rotation_rate[i, 1, n], T.rotation_rate[i, 2, n]
         ww0, ww1, ww2 = T.rate[i, 0, n], T.rate[i, 1, n], T.rate[i, 2, n]
-        for c in range(X.shape[2]):  # also those not begun: a constant number is vectorised whole
+        for c in range(min(-(-begun // VECTOR) * VECTOR, X.shape[2])):
             v0, v1, v2 = X[n, VELOCITY, c], X[n, VELOCITY + 1, c], X[n, VELOCITY + 2, c]
             r0, r1, r2 = X[n, ROTATION, c], X[n, ROTATION + 1, c], X[n, ROTATION + 2, c]
             w0, w1, w2 = X[n, RATE, c], X[n, RATE + 1, c], X[n, RATE + 2, c]

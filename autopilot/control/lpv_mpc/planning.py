@@ -10,7 +10,7 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.constraints import MOTION_ROWS, bound, exceeds, limit_motion
 from colibri.autopilot.control.lpv_mpc.cost import Integers, PlanReferences, Problem, cost, nearest_angle
-from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, RATE, ROTATION, StepTransition, respond
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, RATE, ROTATION, VECTOR, StepTransition, respond
 from colibri.autopilot.control.lpv_mpc.feed_forward import follow, lead
 from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
@@ -239,18 +239,24 @@ def free_minimum(qp: Qp, blocks: int, rotors: int, z: Array) -> bool:
         U[k, :] = 0.0
         U[:, k] = 0.0
         U[k, k], z[k] = 1.0, qp.upper[k]
-    for k in range(n):
-        if not U[k, k] > 0.0:
-            return False
-        U[k, k] = sqrt(U[k, k])
-        z[k] /= U[k, k]
-        for i in range(k + 1, n):
-            U[k, i] /= U[k, k]
-            z[i] -= U[k, i] * z[k]
-        for j in range(k + 1, n):
+    for j in range(n):
+        first, fours = j // VECTOR * VECTOR, j // 4 * 4
+        for k in range(0, fours, 4):  # four rows in a loop, as in `cost`
+            a, b, c, d = U[k, j], U[k + 1, j], U[k + 2, j], U[k + 3, j]
+            for i in range(first, n):
+                U[j, i] = U[j, i] - U[k, i] * a - U[k + 1, i] * b - U[k + 2, i] * c - U[k + 3, i] * d
+        for k in range(fours, j):
             factor = U[k, j]
-            for i in range(j, n):
+            for i in range(first, n):
                 U[j, i] -= U[k, i] * factor
+        if not U[j, j] > 0.0:
+            return False
+        U[j, j] = sqrt(U[j, j])
+        for k in range(j):
+            z[j] -= U[k, j] * z[k]
+        z[j] /= U[j, j]
+        for i in range(j + 1, n):
+            U[j, i] /= U[j, j]
     for i in range(n - 1, -1, -1):
         total = z[i]
         for k in range(i + 1, n):
