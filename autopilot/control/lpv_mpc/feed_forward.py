@@ -14,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.approach import approach, before_jump, feasible_part, stopping_s
 from colibri.autopilot.control.lpv_mpc.model import Disturbance
-from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limit_force, overcome_drag
+from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limited_force, overcome_drag
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.kernels import asin, atan2, cos, sin
@@ -273,7 +273,7 @@ def demanded_force(
         demanded = near[2][0, i] + law.recovery_1_s2 * away + law.recovery_1_s * slower
         force[i] = airframe.mass_kg * (demanded - disturbance.acceleration[i])
     force[2] += airframe.mass_kg * airframe.gravity_m_s2
-    limit_force(force, limits)
+    force[0], force[1], force[2] = limited_force((force[0], force[1], force[2]), limits)
     return force
 
 

@@ -3,12 +3,9 @@
 from math import sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.jit import compiled
-from colibri.common.matrices import norm, put
-from colibri.common.types import Array
+from colibri.common.types import Array, Vector
 
 LEAST_N = 1e-9  # below, a force has no direction
 _DRAG_PASSES = 2  # drag depends on the direction of the force against it
@@ -25,35 +22,35 @@ class ForceLimits(NamedTuple):
 
 
 @compiled
-def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force in place. Height has priority over position; without a tilt limit the direction is kept."""
+def limited_force(force: Vector, limits: ForceLimits) -> Vector:
+    """Return a force within its limits. Height has priority over position; without a tilt limit the direction is kept."""
+    x, y, z = force
     if not limits.upright:
-        total = norm(force)
+        total = sqrt(x * x + y * y + z * z)
         if total > limits.max_n:
-            for i in range(3):
-                force[i] *= limits.max_n / total
-        return
-    force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
-    horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
-    left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
-    allowed = min(force[2] * limits.tilt_tangent, left)
+            part = limits.max_n / total
+            return x * part, y * part, z * part
+        return force
+    z = min(max(z, limits.min_up_n), limits.max_n)
+    horizontal = sqrt(x * x + y * y)
+    left = sqrt(max(limits.max_n * limits.max_n - z * z, 0.0))
+    allowed = min(z * limits.tilt_tangent, left)
     if horizontal > allowed:
-        force[0] *= allowed / horizontal
-        force[1] *= allowed / horizontal
+        part = allowed / horizontal
+        return x * part, y * part, z
+    return x, y, z
 
 
 @compiled
 def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, forces: Array) -> None:
     """Add the force against drag at velocities, m/s, ENU, (n, 3), to forces, (n, 3), within limits."""
-    free = np.empty(3)
     for n in range(forces.shape[0]):
-        force = forces[n]
-        put(force, free)
-        limit_force(force, limits)
+        x, y, z = forces[n, 0], forces[n, 1], forces[n, 2]
+        velocity = (velocities[n, 0], velocities[n, 1], velocities[n, 2])
+        force = limited_force((x, y, z), limits)
         for _ in range(_DRAG_PASSES):
-            thrust = max(norm(force), LEAST_N)
+            thrust = max(sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]), LEAST_N)
             up = (force[0] / thrust, force[1] / thrust, force[2] / thrust)
-            drag = drag_force(airframe, velocities[n], up, thrust)
-            for i in range(3):
-                force[i] = free[i] - drag[i]
-            limit_force(force, limits)
+            drag = drag_force(airframe, velocity, up, thrust)
+            force = limited_force((x - drag[0], y - drag[1], z - drag[2]), limits)
+        forces[n, 0], forces[n, 1], forces[n, 2] = force
