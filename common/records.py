@@ -11,3 +11,7 @@ class Record(msgspec.Struct, frozen=True, array_like=True):
     def _replace(self, **changes: Any) -> Self:
         """Return a copy with `changes`, as a named tuple does."""
         return msgspec.structs.replace(self, **changes)
+
+
+tuple_of = tuple.__new__
+"""Make a named tuple of all its fields, `tuple_of(kind, (field, ...))`, in half the time of a call."""

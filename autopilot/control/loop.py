@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import (
+    AT_REST,
     AttitudeController,
     AttitudeDemand,
     ChargeController,
@@ -39,7 +40,7 @@ from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.config import SettingsError
 from colibri.common.errors import Error
-from colibri.common.records import Record
+from colibri.common.records import Record, tuple_of
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array, PerRotor, Vector
@@ -56,6 +57,7 @@ class Seen(NamedTuple):
 
 
 _ON_SENSORS_S = 0.02  # the estimator does not start with frames further apart than 0.05 s
+_UNREAD = AT_REST[5:]  # of a state where the law does not read the motion: acceleration, rotor speeds; airborne
 _UNSEEN = Seen(-1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -186,7 +188,7 @@ class ControlLoop:
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
         if not self._reads_motion:
-            return VehicleState(position, velocity, attitude, euler, rate)
+            return tuple_of(VehicleState, (position, velocity, attitude, euler, rate, *_UNREAD))
         before_us, (vx, vy, vz), acceleration = self._seen
         if time_us != before_us:
             if before_us >= 0:

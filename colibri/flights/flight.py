@@ -152,9 +152,7 @@ class InMemory:
             if not step.faults:
                 if self._encodes and isinstance(frame, SensorFrame):
                     datagram = self.plant_end.encoded(frame)
-                command = command_as_received(step.command)
-                assert command is not None, "a control law's command is one that rotors can follow"
-                return step, command, (), datagram, self._next_us(plant, autopilot, step)
+                return step, command_as_received(step.command), (), datagram, self._next_us(plant, autopilot, step)
             self.autopilot_end.follow(now_us, self._count_before(now_us, plant.interval_us))
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()

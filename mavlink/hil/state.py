@@ -96,9 +96,9 @@ def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
     return actuator_frame(len(controls)).encode(codec, (command.time_us, flags, *controls, mode))
 
 
-def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
-    """Return the command as rounded by `encode_actuators` and `read_actuators`."""
-    return _within_range(command.time_us, tuple(array("f", command.controls)), command.armed, command.frames)
+def command_as_received(command: ActuatorCommand) -> ActuatorCommand:
+    """Return a valid command as rounded by `encode_actuators` and `read_actuators`."""
+    return ActuatorCommand(command.time_us, tuple(array("f", command.controls)), command.armed, command.frames)
 
 
 def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:

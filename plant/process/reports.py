@@ -109,9 +109,9 @@ class TruthLog:
         else:
             log.extend(TRUTH, rows)
         if self._blocks is not None and until_us >= self._thinning.next_us:
-            for row in rows:
-                if self._thinning.is_due(row[0]):
-                    log.extend(self._blocks, row[None])
+            for row, time_us in enumerate(rows[:, 0].tolist()):
+                if self._thinning.is_due(time_us):
+                    log.extend(self._blocks, rows[row : row + 1])
 
 
 class PlantLogs:

@@ -43,7 +43,7 @@ from colibri.common.config import Degrees, Negative, Positive, Table, read_setti
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import opened, packed
 from colibri.common.matrices import dot, matvec, norm
-from colibri.common.records import Record
+from colibri.common.records import Record, tuple_of
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
@@ -278,7 +278,7 @@ class LpvMpc(AttitudeController[LawMemory]):
         commands, tracked = self.tracker.actuate(tracked, squared, max_speed)
         lag_us = self._lag_us(lag_us, plan, age) if path else 0
         memory = LawMemory(tracked, plan, age, lag_us, wanted.deviation)
-        return memory, Decision(commands, (phi, theta, nearest_turn(psi, yaw)), how)
+        return memory, tuple_of(Decision, (commands, (phi, theta, nearest_turn(psi, yaw)), how))
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         if plan is None or plan.speeds is None:

@@ -20,7 +20,7 @@ from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import matmul
-from colibri.common.records import Record
+from colibri.common.records import Record, tuple_of
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle
 
@@ -198,10 +198,11 @@ class Mpc:
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
-        active = Active(bounds, 0, tilts, rates)
+        active = tuple_of(Active, (bounds, 0, tilts, rates))
         shown, squared = (states, commands) if self.moments > self.horizon else (None, None)
-        diagnostics = Diagnostics(
-            status, None, solve_time_s, 0.0, active, slack, shown, squared, mass_kg, path_lag_s, iterations
+        diagnostics = tuple_of(
+            Diagnostics,
+            (status, None, solve_time_s, 0.0, active, slack, shown, squared, mass_kg, path_lag_s, iterations),
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics

@@ -23,7 +23,7 @@ class ForceLimits(NamedTuple):
 
 @compiled
 def limited_force(force: Vector, limits: ForceLimits) -> Vector:
-    """Return a force within its limits. Height has priority over position; without a tilt limit the direction is kept."""
+    """Return a force within its limits: height has priority over place; without a tilt limit the direction is kept."""
     x, y, z = force
     if not limits.upright:
         total = sqrt(x * x + y * y + z * z)

@@ -63,4 +63,5 @@ class VehicleTracker:
         """Return rotor commands, vehicle's unit, and the next tracker state; `max_speed` in parts of the largest."""
         rotors = np.empty(self._actuated)
         rotor_lag.actuate(tracked.rotors, squared, max_speed, self._rotors, rotors)
-        return rotors[0, : squared.size], tracked._replace(rotors=rotors)
+        after = Tracked(rotors, tracked.measured, tracked.estimate, tracked.charge_ah, tracked.mass_kg)
+        return rotors[0, : squared.size], after

@@ -11,6 +11,7 @@ from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2
 from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common import elementary, elementwise
+from colibri.common.records import tuple_of
 from colibri.common.types import Array
 
 _VERTICAL_SPEED_DECIMALS = 8
@@ -39,7 +40,10 @@ class Planner:
         if block != self._block:
             self._block, self.table = block, self._tabulate(block)
         ahead, (p, v, a, j, s, yaw, yaw_rate, yaw_acc) = slice(first, first + self.preview.samples), self.table
-        return Horizon(p[ahead], v[ahead], a[ahead], j[ahead], s[ahead], yaw[ahead], yaw_rate[ahead], yaw_acc[ahead])
+        return tuple_of(
+            Horizon,
+            (p[ahead], v[ahead], a[ahead], j[ahead], s[ahead], yaw[ahead], yaw_rate[ahead], yaw_acc[ahead]),
+        )
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
         """Return a horizon between instants `grid_us` apart, extrapolated from the one before."""
