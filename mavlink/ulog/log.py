@@ -65,13 +65,11 @@ class TopicLog:
     def extend(self, encoder: RowEncoder, rows: Array) -> None:
         """Add rows, (n, columns)."""
         block = self._blocks.get(encoder) or self._begin_block(encoder)
-        while (end := block.used + len(rows)) >= encoder.block_rows:
-            left = encoder.block_rows - block.used
-            block.table[block.used :] = rows[:left]
-            block.used, rows = encoder.block_rows, rows[left:]
+        while len(rows) >= (left := encoder.block_rows - block.used):
+            block.put(rows[:left])
             self._take(encoder, block)
-        block.table[block.used : end] = rows
-        block.used = end
+            rows = rows[left:]
+        block.put(rows)
 
     def queue(self, encoded: bytes) -> None:
         self._queued.append(encoded)
@@ -96,7 +94,7 @@ class TopicLog:
         self._append_queued()
         used, block.used = block.used, 0
         with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a column
-            self._keep(encoder, encoder.encode(block.table[:used]))
+            self._keep(encoder, encoder.encode(np.frombuffer(block.memory).reshape(encoder.block_rows, -1)[:used]))
 
     def _append_queued(self) -> None:
         queued, self._queued = self._queued, []
@@ -110,12 +108,15 @@ class TopicLog:
 class _Block:
     """Memory of rows that wait, packed at once: numbers kept as objects would spread over the caches."""
 
-    __slots__ = ("memory", "pack_into", "row_bytes", "table", "used")
+    __slots__ = ("memory", "pack_into", "row_bytes", "used")
 
     def __init__(self, encoder: RowEncoder) -> None:
         self.pack_into, self.row_bytes = encoder.pack.pack_into, encoder.pack.size
         self.memory, self.used = bytearray(self.row_bytes * encoder.block_rows), 0
-        self.table: Array = np.frombuffer(self.memory).reshape(encoder.block_rows, -1)
+
+    def put(self, rows: Array) -> None:
+        begin, self.used = self.used, self.used + len(rows)
+        self.memory[begin * self.row_bytes : self.used * self.row_bytes] = rows.tobytes()
 
 
 class FileLog(TopicLog):

@@ -107,7 +107,8 @@ class Physics:
             velocity = earth_from_body(attitude_of(state), (state[0], state[1], state[2]))
             wind, eddies = self._air.go_on(world.eddies, time_us, state[8], velocity, interval_us)
             rows[-1, WIND:OTHER_ROTORS] = wind
-        after = World(time_us, state, tuple(speeds[: len(self._standing)]), row[USED], row[VOLTAGE], wind, eddies)
+        voltage_v = nan if self._battery is None else row[VOLTAGE]  # one nan: worlds without a battery can be equal
+        after = World(time_us, state, tuple(speeds[: len(self._standing)]), row[USED], voltage_v, wind, eddies)
         self.rows, self._end = rows, (after, x)
         return after
 

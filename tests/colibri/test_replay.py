@@ -96,6 +96,7 @@ def change(log: Path, time_us: int, more: float) -> None:
     content = bytearray(log.read_bytes())
     rows = np.concatenate(list(FlightFile(log).blocks(COMMAND)))
     (row,) = rows[np.rint(1e6 * rows[:, 0]) == time_us]
+    row[0] = time_us
     recorded = COMMAND.encode(row[None])
     row[1] += more
     at = content.index(recorded)

@@ -135,7 +135,7 @@ def respond(
     """Write the deviations by a unit change of one rotor's command in one block.
 
     `means`, (b, N), and `levels`, (b, N + 1), are the squared speeds by that change over steps and at their ends;
-    column m j + i of `responses` is rotor i in block j.
+    column m j + i of `responses` is rotor i in block j. Before its block it stays as it was: zero.
     """
     model = packed[0]
     inputs = responses.shape[2] // means.shape[0]

@@ -20,10 +20,10 @@ from tests.support.plant_flights import command, flight, hummingbird, states
 UNEVEN = (480.0, 500.0, 510.0, 495.0)
 PARAMETERS = packed(parameters_of(hummingbird("drag", "rotor-lag"), (1.0, -2.0, 0.0)))
 CACHED = """
-from colibri.plant.physics.integrators import adaptive_step, fixed_step
+from colibri.plant.physics.frames import adaptive_frames, fixed_frames
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.physics.world import Physics
-for name, kernel in (("rk4", fixed_step), ("adaptive", adaptive_step)):
+for name, kernel in (("rk4", fixed_frames), ("adaptive", adaptive_frames)):
     Physics(load_vehicle("hummingbird"), name)
     print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))
 """

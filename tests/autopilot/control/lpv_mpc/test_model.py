@@ -66,7 +66,8 @@ def test_deviations_are_the_motions_derivative(seed: int, without: list[str]) ->
     rigid, squared, commands = start(seed)
     commands[:] = commands[0]
     motion, speeds = rolled(vehicle, rigid, squared, commands)
-    responses = np.full((STEPS + 1, DEVIATIONS, ROTORS * (len(STARTS) - 1)), np.nan)
+    responses = np.zeros((STEPS + 1, DEVIATIONS, ROTORS * (len(STARTS) - 1)))
+    respond(motion[:, ::-1].copy(), speeds, means, levels, packed(numbers), empty_transition(STEPS, ROTORS), responses)
     respond(motion, speeds, means, levels, packed(numbers), empty_transition(STEPS, ROTORS), responses)
     step = 1e-4
     for column in range(responses.shape[2]):
