@@ -243,8 +243,8 @@ class ControlLoop:
         self._reads_motion = vars(type(controller)).get("reads_motion", True)  # not that of a base class
         lag = rotor_lag(self.vehicle, controller.control_interval_us * 1e-6)
         self._lag = (lag.up, lag.down)
-        if not self._shows_plan and isinstance(controller, QuietController):
-            controller.shows_plan = False
+        if not self._shows_plan and isinstance(controller, QuietController) and "shows_plan" in vars(type(controller)):
+            controller.shows_plan = False  # a subclass may read the plan
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
         on_path = controller if isinstance(controller, PathController) else None
