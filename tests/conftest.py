@@ -24,10 +24,10 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
-    import_module("colibri.analysis.figures")  # with the true can_fork: two processes would copy what is collected
+    import_module("colibri.analysis.figures")  # with the true ready_to_fork: two processes would copy what is collected
     # Flights over UDP fork, as those of users do, beside the waiting threads of pytest-xdist and jemalloc.
     patch, forks = pytest.MonkeyPatch(), import_module("tests.support.forks")
-    patch.setattr("colibri.flights.launcher.can_fork", lambda: threading.active_count() == 1)
+    patch.setattr("colibri.flights.launcher.ready_to_fork", lambda: threading.active_count() == 1)
     patch.setattr("colibri.flights.fleet.Child", forks.forked_child)
     patch.setattr("colibri.mavlink.links.udp.SPIN_S", 0.0)  # the tests beside them need the cores
     patch.setattr("tools.harness.processes.subprocess", forks.FORKS)

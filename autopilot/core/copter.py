@@ -65,6 +65,8 @@ def copter_autopilot(
 class Copter:
     """Flies a vehicle by its pilot, under supervision, and serves ground stations."""
 
+    repeats = False
+
     def __init__(
         self, parts: Parts, checkpointer: Checkpointer, history: History | None, start_speed: float, gravity_m_s2: float
     ) -> None:
@@ -86,8 +88,6 @@ class Copter:
         self.time_us: int | None = None  # of the last frame with a known state
         self.waiting_us: int | None = None
         self._settles_by_us = 0
-
-    repeats = False
 
     @property
     def mode(self) -> str:

@@ -19,7 +19,7 @@ from colibri.analysis.figure_series import ATTITUDE, POSITION, START_S, FigureSe
 from colibri.analysis.recording import INPUT, POSITION_REFERENCE, SETTLED_AFTER_S, rotor_names
 from colibri.analysis.report import length as in_metres
 from colibri.common.process.lifecycle import EXIT_FAILED, end_with, gc_frozen, handle_endings
-from colibri.flights.launcher import can_fork
+from colibri.flights.launcher import ready_to_fork
 from colibri.flights.plan import FlightPlan
 
 GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
@@ -86,7 +86,7 @@ def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
     """Write a flight's figures, half of them by a fork where possible."""
     figures, other = figures_of(flown, plan), None
     own, others = list(figures)[::2], list(figures)[1::2]
-    if can_fork():
+    if ready_to_fork():
         other = get_context("fork").Process(target=_draw, args=(figures, others, plan.out, getpid()), daemon=True)
         other.start()
     _draw(figures, own, plan.out)

@@ -71,7 +71,7 @@ class Pool:
     def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
         """Yield jobs with results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
-        context = get_context("fork" if launcher.can_fork() else "spawn")
+        context = get_context("fork" if launcher.ready_to_fork() else "spawn")
         try:
             has_begun = context.Event()
         except OSError as error:

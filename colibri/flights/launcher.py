@@ -41,8 +41,8 @@ def name_of(spec: ProcessSpec) -> str:
     return "plant" if isinstance(spec, PlantSpec) else "autopilot"
 
 
-def can_fork() -> bool:
-    """Whether this process may be forked: locks of other threads would stay held.
+def ready_to_fork() -> bool:
+    """Make this process one that may be forked, if possible; else locks of other threads would stay held.
 
     A first fork, which ends at once, has OpenBLAS end its threads; it starts them again when it needs them.
     """
@@ -67,7 +67,7 @@ class Child:
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
         self.name = name_of(spec)
-        self.forked = fork and can_fork()
+        self.forked = fork and ready_to_fork()
         self._rest = b""
         read, out = os.pipe() if log is None else (None, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND))
         error = 2 if log is None else out

@@ -28,8 +28,8 @@ from colibri.plant.physics.world import World
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_WAIT_S = 0.1  # between two checks whether the process shall end
-_COLUMNS = len(TRUTH.names)
 SILENT_AFTER_S = 2.0  # wall-clock silence that is reported
+_COLUMNS = len(TRUTH.names)
 
 
 def all_parameters_by(vehicle: str, whom: str) -> str:

@@ -7,17 +7,17 @@ import sys
 SCRIPT = """
 import _thread, threading, time
 import numpy as np
-from colibri.flights.launcher import can_fork
+from colibri.flights.launcher import ready_to_fork
 
 square = np.ones((400, 400))
 square @ square  # OpenBLAS has begun its threads
-answers = [can_fork()]
+answers = [ready_to_fork()]
 ended = threading.Event()
 threading.Thread(target=ended.wait).start()
-answers.append(can_fork())
+answers.append(ready_to_fork())
 ended.set()
 _thread.start_new_thread(time.sleep, (60,))  # as of a library: Python does not list it
-answers.append(can_fork())
+answers.append(ready_to_fork())
 print(*answers)
 """
 

@@ -41,13 +41,13 @@ def test_jobs_are_taken_as_they_are_needed() -> None:
 
 @pytest.mark.parametrize("forks", [True, False])
 def test_forked_workers_have_what_is_loaded(forks: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("colibri.flights.launcher.can_fork", lambda: forks)
+    monkeypatch.setattr("colibri.flights.launcher.ready_to_fork", lambda: forks)
     monkeypatch.setattr(jobs, "loaded", "here")
     assert dict(Pool(2).each(jobs.what_is_loaded, None, range(4))) == dict.fromkeys(range(4), "here" if forks else "")
 
 
 def test_forked_workers_draw_other_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("colibri.flights.launcher.can_fork", lambda: True)
+    monkeypatch.setattr("colibri.flights.launcher.ready_to_fork", lambda: True)
     assert dict(Pool(1).each(jobs.drawn, None, [0]))[0] != dict(Pool(1).each(jobs.drawn, None, [0]))[0]
 
 
