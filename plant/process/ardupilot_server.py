@@ -12,7 +12,7 @@ import msgspec
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
-from colibri.common.types import Address
+from colibri.common.types import Address, Array
 from colibri.mavlink.hil.lockstep import is_another
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.udp import UdpLink, is_bound
@@ -88,6 +88,11 @@ class ArduPilotEnd:
         self._advance(rate_hz, fields)
         self._reply = _encode(self.world, self._physics)
         return self._reply
+
+    @property
+    def flown(self) -> Array:
+        """Return the truth after the last step, a row of `physics.frames`."""
+        return self._physics.rows
 
     def accepts_another(self, now_s: float, sender: Address | None = None) -> bool:
         """Whether the peer is lost, so that another ArduPilot may take over, or is the sender."""
@@ -193,7 +198,7 @@ class ArduPilotServer:
             if self._end.world is not before:
                 self._steps += 1
                 if self._logs:
-                    self._logs.write_world(self._end.world)
+                    self._logs.write_truth(self._end.flown, self._end.world.time_us)
             self._progress.report(self._end.world.time_us / 1e6, now_s - self._began_s)
 
     def _report(self, time_us: int, event: str, text: str) -> None:
