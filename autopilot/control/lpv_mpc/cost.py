@@ -16,9 +16,9 @@ from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, R
 from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
 from colibri.autopilot.control.qp import Qp
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import compiled, inlined
+from colibri.common.jit import apart, compiled, inlined
 from colibri.common.kernels import atan2
-from colibri.common.matrices import put
+from colibri.common.matrices import add_four, put
 from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -147,11 +147,19 @@ def _add_motion(
         first = f[k] + p0 * P0 + v0 * V0 + w0 * W0
         second = first + p1 * P1 + v1 * V1 + w1 * W1
         f[k] = second + p2 * P2 + v2 * V2 + w2 * W2 + heading * turned
-        for i in range(_reach(k, X.shape[1])):
-            first = H[k, i] + P0 * X[POSITION, i] + V0 * X[VELOCITY, i] + W0 * X[RATE, i]
-            second = first + P1 * X[POSITION + 1, i] + V1 * X[VELOCITY + 1, i] + W1 * X[RATE + 1, i]
-            third = second + P2 * X[POSITION + 2, i] + V2 * X[VELOCITY + 2, i] + W2 * X[RATE + 2, i]
-            H[k, i] = third + turned * row[i]
+        factors = (P0, V0, W0, P1, V1, W1, P2, V2, W2, turned)
+        _add_rows(H[k], X, row, factors, _reach(k, X.shape[1]))
+
+
+@apart
+def _add_rows(to: Array, X: Array, row: Array, factors: tuple[float, ...], count: int) -> None:
+    """Add rows of X, and another one, times factors to the first `count` numbers of a row of H."""
+    P0, V0, W0, P1, V1, W1, P2, V2, W2, turned = factors
+    for i in range(count):
+        first = to[i] + P0 * X[POSITION, i] + V0 * X[VELOCITY, i] + W0 * X[RATE, i]
+        second = first + P1 * X[POSITION + 1, i] + V1 * X[VELOCITY + 1, i] + W1 * X[RATE + 1, i]
+        third = second + P2 * X[POSITION + 2, i] + V2 * X[VELOCITY + 2, i] + W2 * X[RATE + 2, i]
+        to[i] = third + turned * row[i]
 
 
 @compiled
@@ -236,15 +244,12 @@ def _add_terminal(
         for j in range(states):
             weighted[i] += S[i, j] * error[j]
         for j in range(0, states, 4):
-            s, t, u, v = S[i, j], S[i, j + 1], S[i, j + 2], S[i, j + 3]
-            for k in range(moved):
-                W[i, k] = W[i, k] + s * E[j, k] + t * E[j + 1, k] + u * E[j + 2, k] + v * E[j + 3, k]
+            add_four(W[i], E[j : j + 4], (S[i, j], S[i, j + 1], S[i, j + 2], S[i, j + 3]), 0, moved)
     for i in range(0, states, 4):
         for k in range(moved):
             s, t, u, v = E[i, k], E[i + 1, k], E[i + 2, k], E[i + 3, k]
             f[k] = f[k] + s * weighted[i] + t * weighted[i + 1] + u * weighted[i + 2] + v * weighted[i + 3]
-            for j in range(_reach(k, moved)):
-                H[k, j] = H[k, j] + s * W[i, j] + t * W[i + 1, j] + u * W[i + 2, j] + v * W[i + 3, j]
+            add_four(H[k], W[i : i + 4], (s, t, u, v), 0, _reach(k, moved))
 
 
 @inlined

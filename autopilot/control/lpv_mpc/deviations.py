@@ -14,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, Model
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import Packed, compiled, inlined, opened, packed
+from colibri.common.jit import Packed, apart, compiled, inlined, opened, packed
 from colibri.common.types import Array
 
 DEVIATIONS = 12
@@ -145,8 +145,8 @@ def respond(
         blocks = means.shape[0]
         while means[blocks - 1, step] == 0.0:  # not begun; without lag, those before have ended, too
             blocks -= 1
-        _advance(responses, step, T, model.interval_s, inputs * blocks)
         X = responses[step + 1]
+        _advance(responses[step], X, step, T, model.interval_s, inputs * blocks)
         for block in range(blocks):
             mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
             for rotor in range(len(model.momentum)):
@@ -159,8 +159,8 @@ def respond(
                 X[RATE + 2, column] += T.spin[rotor, step] * change
 
 
-@inlined
-def _advance(X: Array, n: int, T: StepTransition, h: float, begun: int) -> None:
+@apart
+def _advance(X: Array, to: Array, n: int, T: StepTransition, h: float, begun: int) -> None:
     """Advance the first `begun` columns, and others with them: whole vectors of columns."""
     for i in range(3):
         pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
@@ -171,17 +171,17 @@ def _advance(X: Array, n: int, T: StepTransition, h: float, begun: int) -> None:
         rr0, rr1, rr2 = T.rotation[i, 0, n], T.rotation[i, 1, n], T.rotation[i, 2, n]
         rw0, rw1, rw2 = T.rotation_rate[i, 0, n], T.rotation_rate[i, 1, n], T.rotation_rate[i, 2, n]
         ww0, ww1, ww2 = T.rate[i, 0, n], T.rate[i, 1, n], T.rate[i, 2, n]
-        for c in range(min(-(-begun // VECTOR) * VECTOR, X.shape[2])):
-            v0, v1, v2 = X[n, VELOCITY, c], X[n, VELOCITY + 1, c], X[n, VELOCITY + 2, c]
-            r0, r1, r2 = X[n, ROTATION, c], X[n, ROTATION + 1, c], X[n, ROTATION + 2, c]
-            w0, w1, w2 = X[n, RATE, c], X[n, RATE + 1, c], X[n, RATE + 2, c]
-            place, fall = X[n, POSITION + i, c] + h * X[n, VELOCITY + i, c], X[n, VELOCITY + i, c]
-            X[n + 1, POSITION + i, c] = place + (pr0 * r0 + pw0 * w0) + (pr1 * r1 + pw1 * w1) + (pr2 * r2 + pw2 * w2)
+        for c in range(min(-(-begun // VECTOR) * VECTOR, X.shape[1])):
+            v0, v1, v2 = X[VELOCITY, c], X[VELOCITY + 1, c], X[VELOCITY + 2, c]
+            r0, r1, r2 = X[ROTATION, c], X[ROTATION + 1, c], X[ROTATION + 2, c]
+            w0, w1, w2 = X[RATE, c], X[RATE + 1, c], X[RATE + 2, c]
+            place, fall = X[POSITION + i, c] + h * X[VELOCITY + i, c], X[VELOCITY + i, c]
+            to[POSITION + i, c] = place + (pr0 * r0 + pw0 * w0) + (pr1 * r1 + pw1 * w1) + (pr2 * r2 + pw2 * w2)
             fall += d0 * v0 + vr0 * r0 + vw0 * w0
             fall += d1 * v1 + vr1 * r1 + vw1 * w1
-            X[n + 1, VELOCITY + i, c] = fall + (d2 * v2 + vr2 * r2 + vw2 * w2)
-            X[n + 1, ROTATION + i, c] = 0.0 + (rr0 * r0 + rw0 * w0) + (rr1 * r1 + rw1 * w1) + (rr2 * r2 + rw2 * w2)
-            X[n + 1, RATE + i, c] = 0.0 + ww0 * w0 + ww1 * w1 + ww2 * w2
+            to[VELOCITY + i, c] = fall + (d2 * v2 + vr2 * r2 + vw2 * w2)
+            to[ROTATION + i, c] = 0.0 + (rr0 * r0 + rw0 * w0) + (rr1 * r1 + rw1 * w1) + (rr2 * r2 + rw2 * w2)
+            to[RATE + i, c] = 0.0 + ww0 * w0 + ww1 * w1 + ww2 * w2
 
 
 class _Linearised(NamedTuple):
