@@ -145,7 +145,8 @@ def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
             rows = np.concatenate(list(log.blocks(topic)))
             rows = rows[rows[:, 0] < lasts_s]  # the last is the first of the next
             for began_s in np.arange(rounds) * lasts_s:
-                for block in np.array_split(rows + began_s * (np.arange(rows.shape[1]) == 0), 20):
+                times_us = np.rint(1e6 * (rows[:, :1] + began_s))
+                for block in np.array_split(np.hstack([times_us, rows[:, 1:]]), 20):
                     file.write(topic.encode(block))
     return longer
 
