@@ -143,7 +143,8 @@ def test_what_cannot_be_replayed_is_one_line(content: bytes | None, said: str, c
 def test_a_log_without_frames_is_not_replayed(copy: Path, refused: Refused) -> None:
     log = FlightFile(copy / "flight.ulg")
     (setup,) = read_inputs(log.inputs()).setups.values()
-    commands = b"".join(map(COMMAND.encode, log.blocks(COMMAND)))
+    rows = np.concatenate(list(log.blocks(COMMAND)))
+    commands = COMMAND.encode(np.hstack([np.rint(1e6 * rows[:, :1]), rows[:, 1:]]))
     began = encode_input(0, RecordKind.SETUP, msgspec.json.encode(setup))
     (copy / "flight.ulg").write_bytes(BEGINNING + began + commands)
     assert "flight.ulg: no frame of state feedback was answered" in refused("replay", copy)
