@@ -34,6 +34,16 @@ def test_what_is_solved_solves(seed: int, n: int, m: int) -> None:
     assert matrices.inverse(A) @ A == pytest.approx(np.eye(n), abs=1e-10)
 
 
+def test_four_rows_are_added_one_after_another() -> None:
+    random = np.random.default_rng(0)
+    to, rows, (a, b, c, d) = random.normal(size=21), random.normal(size=(4, 21)), random.normal(size=4).tolist()
+    expected = to.copy()
+    for factor, row in zip((a, b, c, d), rows, strict=True):
+        expected[5:18] += factor * row[5:18]
+    matrices.add_four(to, rows, (a, b, c, d), 5, 18)
+    assert to.tobytes() == expected.tobytes()
+
+
 def test_a_singular_matrix_has_no_finite_inverse() -> None:
     assert not np.isfinite(matrices.inverse(np.ones((2, 2)))).all()
 
