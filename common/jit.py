@@ -46,14 +46,14 @@ def inlined(function: _Function) -> _Function:
     return cast(_Function, _kernel(function, forceinline=True))
 
 
-def apart(function: _Function) -> _Function:
+def noalias(function: _Function) -> _Function:
     """Compile as `inlined` a function whose arrays share no memory: its loops are vectorised without asking for it."""
     kernel = _kernel(function, forceinline=True)
-    kernel._compiler._customize_flags = _apart  # noqa: SLF001
+    kernel._compiler._customize_flags = _without_alias  # noqa: SLF001
     return cast(_Function, kernel)
 
 
-def _apart(flags: Any) -> Any:
+def _without_alias(flags: Any) -> Any:
     flags.noalias = True
     return flags
 

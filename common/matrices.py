@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from colibri.common.jit import apart, compiled, compiled_for
+from colibri.common.jit import compiled, compiled_for, noalias
 from colibri.common.types import Array
 
 _MATRIX, _VECTOR = "float64[:, :]", "float64[:]"
@@ -25,7 +25,7 @@ def put(values: Array, out: Array) -> None:
                 out[i, j] = values[i, j]
 
 
-@apart
+@noalias
 def add_four(to: Array, rows: Array, factors: tuple[float, float, float, float], begin: int, end: int) -> None:
     """Add four rows, (4, n), times factors to the numbers of another, (n,), from `begin` to `end`, one after another.
 

@@ -10,7 +10,7 @@ from colibri.common.types import Address, Array
 from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import BATTERY_EVERY_US, HEARTBEAT_EVERY_US
+from colibri.mavlink.hil.lockstep import BATTERY_EVERY_US, HEARTBEAT_EVERY_US, next_battery_us
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING
@@ -73,11 +73,10 @@ class SteppedFlight(Generic[StagesT]):
         """
         plant = self.plant
         step, command, faults, datagram, next_us = self.wire.exchange(plant, self.autopilot)
-        now_us, interval_us = plant.world.time_us, plant.interval_us
-        plant.answer(command, faults, max(1, (min(next_us, until_us) - now_us) // interval_us))
+        plant.answer(command, faults, min(next_us, until_us))
         world, flown = plant.world, plant.flown
         if len(flown) > 1:
-            self.autopilot.go_on(world.time_us - interval_us)
+            self.autopilot.go_on(world.time_us - plant.interval_us)
         return FrameSample(step, command, world, datagram, self.autopilot.serve(inbox), flown)
 
     def samples(self, duration_s: float) -> Iterator[FrameSample]:
@@ -173,7 +172,7 @@ class InMemory:
         now_us = step.command.time_us
         if step.decision is None or plant.has_news:
             return 0
-        return min(autopilot.next_us(now_us), now_us - now_us % BATTERY_EVERY_US + BATTERY_EVERY_US)
+        return min(autopilot.next_us(now_us), next_battery_us(now_us))
 
     def _count_before(self, now_us: int, interval_us: int) -> int:
         """Have the plant's end count the frames before this one that came without a datagram; return how many."""

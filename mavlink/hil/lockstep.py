@@ -50,6 +50,11 @@ MADE_OF = {
 }
 
 
+def next_battery_us(time_us: int) -> int:
+    """Return the time of the next report of the battery after a frame."""
+    return time_us - time_us % BATTERY_EVERY_US + BATTERY_EVERY_US
+
+
 def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custom_mode: int = 0) -> bytes:
     mode = dialect.MODE_ARMED if armed else 0
     return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)

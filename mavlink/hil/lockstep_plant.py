@@ -122,8 +122,7 @@ class PlantEnd:
         """Return the time of the next frame that must be sent."""
         if self._accepted is None or self.feedback is Feedback.SENSORS:
             return 0
-        battery_us = time_us - time_us % lockstep.BATTERY_EVERY_US + lockstep.BATTERY_EVERY_US
-        return min(self._answered_until_us(self._accepted), battery_us)
+        return min(self._answered_until_us(self._accepted), lockstep.next_battery_us(time_us))
 
     def _answered_until_us(self, command: ActuatorCommand) -> int:
         return command.time_us + command.frames * self.frame_interval_us

@@ -108,8 +108,7 @@ class Server:
         asked = self._end.take_faults()
         if asked:
             pace.change(asked, plant.world.time_us, perf_counter())
-        now_us, interval_us = plant.world.time_us, plant.interval_us
-        plant.answer(command, asked, max(1, int(min(self._end.next_us(now_us), self._end_us) - now_us) // interval_us))
+        plant.answer(command, asked, min(self._end.next_us(plant.world.time_us), self._end_us))
         self._end.skip(len(plant.flown) - 1)
         return True
 

@@ -140,8 +140,8 @@ class Plant:
         status = NOTHING if alone else PlantStatus(battery, self._results, delay_us)
         return self._measure(self.world), status
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = (), frames: int = 1) -> None:
-        """Fly on with `command` for one frame, or for some of several `frames` that need not be measured."""
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = (), until_us: float = 0) -> None:
+        """Fly on with `command` for a frame, or for several up to `until_us`, which need not be measured."""
         self._results = ()
         if faults:
             self.inject(faults)
@@ -157,9 +157,10 @@ class Plant:
             self._actuation.now, self._actuation.delay_us = command, 0
             if self.world.time_us >= self._next_us:
                 self._happen()
-            if frames > 1:
-                until_event = -(-(self._next_us - self.world.time_us) // self.interval_us)
-                frames = 1 if self._results else min(frames, until_event)
+            now_us, frames = self.world.time_us, 1
+            if until_us > now_us and not self._results:
+                until_event = -(-(self._next_us - now_us) // self.interval_us)
+                frames = max(1, min(int(until_us - now_us) // self.interval_us, until_event))
             self.world = self._physics.step(self.world, command, self.interval_us, frames)
             self.flown = self._physics.rows
 

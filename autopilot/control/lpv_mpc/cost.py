@@ -16,7 +16,7 @@ from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, R
 from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
 from colibri.autopilot.control.qp import Qp
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import apart, compiled, inlined
+from colibri.common.jit import compiled, inlined, noalias
 from colibri.common.kernels import atan2
 from colibri.common.matrices import add_four, put
 from colibri.common.types import Array
@@ -151,7 +151,7 @@ def _add_motion(
         _add_rows(H[k], X, row, factors, _reach(k, X.shape[1]))
 
 
-@apart
+@noalias
 def _add_rows(to: Array, X: Array, row: Array, factors: tuple[float, ...], count: int) -> None:
     """Add rows of X, and another one, times factors to the first `count` numbers of a row of H."""
     P0, V0, W0, P1, V1, W1, P2, V2, W2, turned = factors

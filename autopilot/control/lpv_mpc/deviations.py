@@ -14,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, Model
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import Packed, apart, compiled, inlined, opened, packed
+from colibri.common.jit import Packed, compiled, inlined, noalias, opened, packed
 from colibri.common.types import Array
 
 DEVIATIONS = 12
@@ -159,7 +159,7 @@ def respond(
                 X[RATE + 2, column] += T.spin[rotor, step] * change
 
 
-@apart
+@noalias
 def _advance(X: Array, to: Array, n: int, T: StepTransition, h: float, begun: int) -> None:
     """Advance the first `begun` columns, and others with them: whole vectors of columns."""
     for i in range(3):

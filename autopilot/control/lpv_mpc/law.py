@@ -155,12 +155,14 @@ class LpvMpc(AttitudeController[LawMemory]):
 
     @property
     def shows_plan(self) -> bool:
-        return self._mpc.moments > self._mpc.horizon
+        return self._mpc.motion_steps > self._mpc.horizon
 
     @shows_plan.setter
     def shows_plan(self, shows: bool) -> None:
         """Without it, a plan's motion is computed only as far as `_planned` needs it."""
-        self._mpc.moments = self._mpc.horizon + 1 if shows else min(self._shifted_samples, self._mpc.horizon - 1) + 2
+        self._mpc.motion_steps = (
+            self._mpc.horizon + 1 if shows else min(self._shifted_samples, self._mpc.horizon - 1) + 2
+        )
 
     def warm_up(self) -> None:
         """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
-from colibri.autopilot.control.lpv_mpc import constraints, deviations, model, planning
+from colibri.autopilot.control.lpv_mpc import constraints, deviations, model, planning, solution
 from colibri.autopilot.control.lpv_mpc.cost import CostWeights, Problem
 from colibri.autopilot.control.lpv_mpc.model import Lag, Model
 from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
@@ -62,7 +62,7 @@ class Plan(Record, frozen=True):
     """A solved QP."""
 
     commands: Array  # squared speeds at each step, (N, m)
-    states: Array  # `planning.PREDICTED`, nan beyond `Mpc.moments`; squared speeds of m rotors, (N + 1, 12 + m)
+    states: Array  # `planning.PREDICTED`, nan beyond `Mpc.motion_steps`; squared speeds of m rotors, (N + 1, 12 + m)
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
@@ -148,7 +148,7 @@ class Mpc:
             for each, inputs in ((on_track, rotors), (on_track, rotors + 1), (on_hold, rotors))
         )
         self._commands, self._states = (n, rotors), (n + 1, planning.PREDICTED + rotors)
-        self.moments = n + 1  # of a plan whose motion is computed
+        self.motion_steps = n + 1  # of a plan whose motion is computed
 
     def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
         """Return S of the LQR in level flight after the horizon, filled up with zeros to a multiple of four."""
@@ -188,18 +188,20 @@ class Mpc:
         commands, states = np.empty(self._commands), np.empty(self._states)
         started_s = self._clock()
         z: Array | None = qps.minimum
-        is_free, is_beyond, bounds = planning.plan(qps.kind, qps.minimum, False, psi, self.moments, commands, states)
+        is_free, is_beyond, bounds = solution.plan(
+            qps.kind, qps.minimum, False, psi, self.motion_steps, commands, states
+        )
         status, iterations, slack, tilts, rates = QpStatus.SOLVED, 0.0, 0.0, 0, 0
         if is_beyond or not is_free:
             status, z, iterations, slack, (tilts, rates) = self._solve(*qps, is_free=is_free)
             if z is not None:
-                _, _, bounds = planning.plan(qps.kind, z, True, psi, self.moments, commands, states)
+                _, _, bounds = solution.plan(qps.kind, z, True, psi, self.motion_steps, commands, states)
         solve_time_s = self._clock() - started_s
         if z is None:
             unsolved = Diagnostics(status, solve_time_s=solve_time_s, mass_kg=mass_kg, path_lag_s=path_lag_s)
             return None, unsolved._replace(qp_iterations=iterations)
         active = tuple_of(Active, (bounds, 0, tilts, rates))
-        shown, squared = (states, commands) if self.moments > self.horizon else (None, None)
+        shown, squared = (states, commands) if self.motion_steps > self.horizon else (None, None)
         diagnostics = tuple_of(
             Diagnostics,
             (status, None, solve_time_s, 0.0, active, slack, shown, squared, mass_kg, path_lag_s, iterations),
@@ -209,10 +211,10 @@ class Mpc:
 
     def warm_up(self) -> None:
         """Load compiled code of the soft limits, after a first plan."""
-        planning.limit(self.on_clock.kind)
+        solution.limit(self.on_clock.kind)
         z = np.zeros(len(self.on_clock.free.f))
-        planning.is_beyond(self.on_clock.kind, z)
-        planning.count_active(self.on_clock.kind, z)
+        solution.is_beyond(self.on_clock.kind, z)
+        solution.count_active(self.on_clock.kind, z)
 
     def _solve(self, kind: Packed, free: Qp, limited: Qp, minimum: Array, *, is_free: bool) -> Corrections:
         """Return the optimal changes of the corrections, where the unconstrained `minimum` is beyond a limit.
@@ -220,14 +222,14 @@ class Mpc:
         If it `is_free`, it is within the rotor limits; a plan beyond a soft limit is solved again.
         """
         status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
-        if z is None or not (is_free or planning.is_beyond(kind, z)):
+        if z is None or not (is_free or solution.is_beyond(kind, z)):
             return status, z, iterations, 0.0, (0, 0)
-        planning.limit(kind)
+        solution.limit(kind)
         status, z, more = self._solver.solve(limited)
         iterations += more
         if z is None:
             return status, z, iterations, 0.0, (0, 0)
-        slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
+        slack, soft = max(z[len(free.f) :].tolist()), solution.count_active(kind, z)
         return status, z[: len(free.f)].copy(), iterations, slack, soft
 
 

@@ -36,7 +36,7 @@ def logged(plant: Plant, vehicle: str, at_once: int) -> bytes:
     truth = TruthLog(log, load_vehicle(vehicle))
     truth.write_world(plant.world)
     while plant.world.time_us < FRAMES * FRAME_US:
-        plant.answer(held(plant), (), at_once)
+        plant.answer(held(plant), (), plant.world.time_us + at_once * FRAME_US)
         if at_once == 1:
             truth.write_world(plant.world)
         else:
@@ -55,22 +55,22 @@ def test_frames_at_once_are_the_same(vehicle: str, options: dict[str, Any]) -> N
 
 def test_an_event_ends_them() -> None:
     plant = plant_of("hummingbird", events=(Payload(t=0.011, kg=0.1),))
-    plant.answer(held(plant), (), FRAMES)
+    plant.answer(held(plant), (), FRAMES * FRAME_US)
     assert plant.flown[:, 0].tolist() == [4_000.0, 8_000.0, 12_000.0]
 
 
 @pytest.mark.parametrize(("options", "asked"), [({}, [Fault(MOTOR, OFF, 1)]), ({"turbulence": "light"}, [])])
 def test_only_one_is_flown_before_news_or_a_change_of_the_air(options: dict[str, Any], asked: list[Fault]) -> None:
     plant = plant_of("hummingbird", **options)
-    plant.answer(held(plant), asked, FRAMES)
+    plant.answer(held(plant), asked, FRAMES * FRAME_US)
     assert plant.world.time_us == FRAME_US
 
 
 def test_those_before_a_state_that_is_not_finite_are_flown() -> None:
     plant = plant_of("hummingbird", p=3000.0)
-    plant.answer(held(plant), (), FRAMES)
+    plant.answer(held(plant), (), FRAMES * FRAME_US)
     flown = len(plant.flown)
     assert 0 < flown < FRAMES
     assert np.isfinite(plant.world.state).all()
     with pytest.raises(IntegrationError, match=rf"at t = 0\.{flown * 4:03d} s"):
-        plant.answer(held(plant), (), FRAMES)
+        plant.answer(held(plant), (), FRAMES * FRAME_US)

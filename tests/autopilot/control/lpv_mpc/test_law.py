@@ -55,7 +55,7 @@ def test_an_attitude_and_a_thrust_are_held() -> None:
 
 def failing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(QpSolver, "solve", lambda *_: QpResult(QpStatus.TIME_OUT, None))
-    monkeypatch.setattr("colibri.autopilot.control.lpv_mpc.mpc.planning.plan", lambda *_: (False, False, 0))
+    monkeypatch.setattr("colibri.autopilot.control.lpv_mpc.mpc.solution.plan", lambda *_: (False, False, 0))
 
 
 def test_fallbacks_are_shifted_plan_then_recovery(monkeypatch: pytest.MonkeyPatch) -> None:

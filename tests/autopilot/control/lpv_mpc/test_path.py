@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.interface import Horizon, Preview
-from colibri.autopilot.control.lpv_mpc import path, planning
+from colibri.autopilot.control.lpv_mpc import path, solution
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, VELOCITY
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow
@@ -81,7 +81,7 @@ def test_a_minimum_with_speeds_at_their_bounds_can_be_free(reward: float) -> Non
     f[ROTORS :: ROTORS + 1] -= reward
     lower[ROTORS :: ROTORS + 1], upper[ROTORS :: ROTORS + 1] = -0.5, 0.1
     qp, z = Qp(root @ root.T + np.eye(n), f, np.zeros((0, n)), np.zeros(0), lower, upper), np.empty(n)
-    assert planning.free_minimum(qp, 2, ROTORS, z) is (reward > 0.0)
+    assert solution.free_minimum(qp, 2, ROTORS, z) is (reward > 0.0)
     solved = QpSolver("daqp", 1e-10).solve(qp).x
     assert solved is not None
     assert np.allclose(z, solved, atol=1e-8) is (reward > 0.0)

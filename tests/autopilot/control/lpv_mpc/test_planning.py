@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.lpv_mpc import constraints, planning
+from colibri.autopilot.control.lpv_mpc import constraints, planning, solution
 from colibri.autopilot.control.qp import Qp, QpSolver
 
 STARTS, ROTORS = np.array([0, 1, 3, 6]), 4
@@ -19,7 +19,7 @@ def random_qp(seed: int, room: float) -> Qp:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_free_minimum_is_the_solvers(seed: int) -> None:
     qp, z = random_qp(seed, 10.0), np.empty(12)
-    assert planning.free_minimum(qp, 3, ROTORS, z)
+    assert solution.free_minimum(qp, 3, ROTORS, z)
     solved = QpSolver("daqp", 1e-10).solve(qp).x
     assert solved is not None
     assert z == pytest.approx(solved, abs=1e-9)
@@ -32,7 +32,7 @@ def test_what_is_beyond_a_bound_or_has_no_minimum_is_not_free(spoil: str) -> Non
         qp.H[3, 3] = -1.0
     if spoil == "not a number":
         qp.f[2] = np.nan
-    assert not planning.free_minimum(qp, 3, ROTORS, z)
+    assert not solution.free_minimum(qp, 3, ROTORS, z)
 
 
 @pytest.mark.parametrize("seed", range(5))
