@@ -20,7 +20,7 @@ from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square
 from colibri.common.jit import compiled
-from colibri.common.types import Array
+from colibri.common.types import Array, Matrix
 from colibri.plant.vehicle.sensors import Sensors
 
 # Time, µs; state (10,) before the test; velocity innovation; time of the last pressure test, µs; its height, m.
@@ -125,7 +125,7 @@ def find_bias(
     if rest > (freedom + 5.0 * sqrt(2.0 * freedom)) * velocity_variance:
         return 0.0
     began_s = sqrt(lacks[0, 0] ** 2 + lacks[0, 1] ** 2 + lacks[0, 2] ** 2) / size
-    moved, last = _integrated(rows, first, lacks, 0.5 * began_s * lacks[0]), first
+    moved, last = _integrated(rows, first, lacks, lacks[0], 0.5 * began_s), first
     while last >= 0 and rows[last, TIME] > rows[first, TIME] - began_s - _ONSET_S:
         last -= 1
     begin = last
@@ -133,15 +133,15 @@ def find_bias(
         begin -= 1
     if last - begin < _FEWEST_BEFORE - 1:
         return 0.0
-    drifted = _integrated(rows, begin, rows[begin:, VELOCITY : VELOCITY + 3].copy(), np.zeros(3))
+    drifted = _integrated(rows, begin, rows[begin:, VELOCITY : VELOCITY + 3].copy(), np.zeros(3), 1.0)
     if abs(bias[2]) > _ALONG_PART * size and not _is_seen(rows, first, begin, last, moved, drifted, height_variance):
         return 0.0
     if not _is_felt(rows, first, begin, last, gravity, bias):
         return 0.0
-    found[0], found[1], found[2] = bias, lacks[-1], moved[-1]
-    found[2] -= (
-        rows[-1, POSITION : POSITION + 3] - rows[last, POSITION : POSITION + 3] - (drifted[-1] - drifted[last - begin])
-    )
+    for i in range(3):
+        drift = drifted[-1, i] - drifted[last - begin, i]
+        found[0, i], found[1, i] = bias[i], lacks[-1, i]
+        found[2, i] = moved[-1, i] - (rows[-1, POSITION + i] - rows[last, POSITION + i] - drift)
     return velocity_variance / spread
 
 
@@ -164,58 +164,67 @@ def _is_seen(
 @compiled
 def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
     """Check that the lateral specific force shows the bias; rows `begin` to `last` precede the fault."""
-    now, before = np.zeros(2), np.zeros(2)
-    for k in range(first + 1, len(rows)):
-        now += _felt(rows, k, gravity)
-    for k in range(begin + 1, last + 1):
-        before += _felt(rows, k, gravity)
-    change = now / (len(rows) - 1 - first) - before / (last - begin)
-    felt = sqrt(change[0] ** 2 + change[1] ** 2)
+    x, y = _mean_felt(rows, first, len(rows) - 1, gravity)
+    before_x, before_y = _mean_felt(rows, begin, last, gravity)
+    x, y = x - before_x, y - before_y
     size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
-    return sqrt((change[0] - bias[0]) ** 2 + (change[1] - bias[1]) ** 2) <= _ALIKE_PART * max(felt, size)
+    return sqrt((x - bias[0]) ** 2 + (y - bias[1]) ** 2) <= _ALIKE_PART * max(sqrt(x**2 + y**2), size)
 
 
 @compiled
-def _felt(rows: Array, k: int, gravity: float) -> Array:
-    R, dt = _between(rows, k), rows[k, TIME] - rows[k - 1, TIME]
-    force = np.zeros(2)
-    for i in range(3):
-        along = (rows[k, VELOCITY + i] - rows[k - 1, VELOCITY + i]) / dt + (gravity if i == 2 else 0.0)
-        force[0] += R[i, 0] * along
-        force[1] += R[i, 1] * along
-    return force
+def _mean_felt(rows: Array, begin: int, last: int, gravity: float) -> tuple[float, float]:
+    """Return the mean specific force along x and y of the body between two fixes."""
+    R = np.empty((3, 3))
+    total_x, total_y = 0.0, 0.0
+    for k in range(begin + 1, last + 1):
+        _put_between(rows, k, R)
+        dt = rows[k, TIME] - rows[k - 1, TIME]
+        x, y = 0.0, 0.0
+        for i in range(3):
+            along = (rows[k, VELOCITY + i] - rows[k - 1, VELOCITY + i]) / dt + (gravity if i == 2 else 0.0)
+            x += R[i, 0] * along
+            y += R[i, 1] * along
+        total_x, total_y = total_x + x, total_y + y
+    return total_x / (last - begin), total_y / (last - begin)
 
 
 @compiled
 def _turned(rows: Array, first: int) -> Array:
     """Return ∫R dt from the first rejected fix to each later one, (n, 3, 3)."""
-    A = np.zeros((len(rows) - first, 3, 3))
+    A, R = np.zeros((len(rows) - first, 3, 3)), np.empty((3, 3))
     for k in range(1, len(A)):
         dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
-        A[k] = A[k - 1] + _between(rows, first + k) * dt
+        _put_between(rows, first + k, R)
+        for i in range(3):
+            for j in range(3):
+                A[k, i, j] = A[k - 1, i, j] + R[i, j] * dt
     return A
 
 
 @compiled
-def _between(rows: Array, k: int) -> Array:
-    """Return the mean rotation from body to earth since the previous fix, (3, 3)."""
-    R = np.empty((2, 3, 3))
-    for j in range(2):
-        w, x, y, z = rows[k - j, ATTITUDE : ATTITUDE + 4]
-        R[j] = np.array(rotation_matrix((w, x, y, z)))
-    mean: Array = 0.5 * (R[0] + R[1])
-    return mean
+def _put_between(rows: Array, k: int, R: Array) -> None:
+    """Write the mean rotation from body to earth since the previous fix, (3, 3)."""
+    now, before = _rotation(rows[k]), _rotation(rows[k - 1])
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = 0.5 * (now[i][j] + before[i][j])
+
+
+@compiled
+def _rotation(row: Array) -> Matrix:
+    return rotation_matrix((row[ATTITUDE], row[ATTITUDE + 1], row[ATTITUDE + 2], row[ATTITUDE + 3]))
 
 
 @compiled
 def _centred(columns: Array) -> Array:
     """Subtract the means of columns (n, 3) in place, and return them."""
     mean = np.zeros(3)
-    for row in columns:
-        mean += row
-    mean /= len(columns)
-    for k in range(len(columns)):
-        columns[k] -= mean
+    for i in range(3):
+        for k in range(len(columns)):
+            mean[i] += columns[k, i]
+        mean[i] /= len(columns)
+        for k in range(len(columns)):
+            columns[k, i] -= mean[i]
     return mean
 
 
@@ -226,23 +235,27 @@ def _fitted(A: Array, d: Array) -> tuple[Array, float]:
     for k in range(len(A)):
         for i in range(3):
             spread += (A[k, i, 0] ** 2 + A[k, i, 1] ** 2 + A[k, i, 2] ** 2) / 3.0
-    bias = np.zeros(3)
+    bias, step = np.zeros(3), np.empty(3)
     for _ in range(_STEPS):
-        step = np.zeros(3)
+        for j in range(3):
+            step[j] = 0.0
         for k in range(len(A)):
             for i in range(3):
                 rest = d[k, i] + A[k, i, 0] * bias[0] + A[k, i, 1] * bias[1] + A[k, i, 2] * bias[2]
-                step += rest * A[k, i]
-        bias -= step / spread
+                for j in range(3):
+                    step[j] += rest * A[k, i, j]
+        for j in range(3):
+            bias[j] -= step[j] / spread
     return bias, spread
 
 
 @compiled
-def _integrated(rows: Array, first: int, velocity: Array, start: Array) -> Array:
-    """Integrate a velocity (n, 3) from `start` at fix `first` on, m ENU."""
+def _integrated(rows: Array, first: int, velocity: Array, start: Array, part: float) -> Array:
+    """Integrate a velocity (n, 3) from `part` of `start` at fix `first` on, m ENU."""
     place = np.empty((len(velocity), 3))
-    place[0] = start
-    for k in range(1, len(velocity)):
-        dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
-        place[k] = place[k - 1] + 0.5 * dt * (velocity[k - 1] + velocity[k])
+    for i in range(3):
+        place[0, i] = part * start[i]
+        for k in range(1, len(velocity)):
+            dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
+            place[k, i] = place[k - 1, i] + 0.5 * dt * (velocity[k - 1, i] + velocity[k, i])
     return place

@@ -106,8 +106,9 @@ def fuse_rest(
         H[i, ACCEL_BIAS + i], H[3 + i, HARD_IRON + i] = 1.0, 1.0
         y[i] = (force[i] - (up[i] + x[13 + i])) / sqrt(force_variance)
         y[3 + i] = (measured[i] - (body[i] + x[20 + i])) / sqrt(field_variance)
-    H[:3] /= sqrt(force_variance)
-    H[3:] /= sqrt(field_variance)
+        for j in range(ERRORS):
+            H[i, j] /= sqrt(force_variance)
+            H[3 + i, j] /= sqrt(field_variance)
     return fuse_rows(x, P, H, y, 1.0, inf)
 
 
@@ -219,15 +220,19 @@ def _join(P: Array, C: Array, K: Array, S: Array) -> None:
 
 @compiled
 def _inject(x: Array, P: Array, error: Array) -> None:
-    x[:6] += error[:6]
-    x[10:] += error[9:]
+    for i in range(ATTITUDE):
+        x[i] += error[i]
+    for i in range(ATTITUDE + 3, ERRORS):
+        x[1 + i] += error[i]
     a, b, c = 0.5 * error[6], 0.5 * error[7], 0.5 * error[8]
-    w, q1, q2, q3 = x[6:10].copy()
+    w, q1, q2, q3 = x[6], x[7], x[8], x[9]
     x[6] = w - q1 * a - q2 * b - q3 * c
     x[7] = q1 + w * a + q2 * c - q3 * b
     x[8] = q2 + w * b + q3 * a - q1 * c
     x[9] = q3 + w * c + q1 * b - q2 * a
-    x[6:10] /= sqrt(x[6] ** 2 + x[7] ** 2 + x[8] ** 2 + x[9] ** 2)
+    size = sqrt(x[6] ** 2 + x[7] ** 2 + x[8] ** 2 + x[9] ** 2)
+    for i in range(6, 10):
+        x[i] /= size
     for j in range(ERRORS):
         p, q, r = P[6, j], P[7, j], P[8, j]
         P[6, j], P[7, j], P[8, j] = p + c * q - b * r, q - c * p + a * r, r + b * p - a * q

@@ -10,6 +10,7 @@ import numpy as np
 
 from colibri.common.jit import compiled
 from colibri.common.kernels import atan2, cos, sin
+from colibri.common.matrices import put
 from colibri.common.types import Array, Vector
 
 TILT, ATTITUDE, RATE = 0, 1, 2
@@ -58,8 +59,8 @@ def slew_on(
         over, yaw_rad = _nearest_way(vector, yaw_rad, angles[0], wanted)
     for n in range(angles.shape[0] - 1):
         here, there = angles[n], angles[n + 1]
-        there[:] = here
-        rates[n + 1] = rates[n]
+        put(here, there)
+        put(rates[n], rates[n + 1])
         if kind == RATE:
             _euler_rates(here, vector, wanted_rate)
         else:
@@ -72,9 +73,9 @@ def slew_on(
             wanted[0], wanted[1] = vector[0], vector[1]
         elif kind == ATTITUDE:
             _aim(vector, there[2], free, over, slew.max_tilt_rad, here, wanted)
-            after = wanted[:2].copy()
+            phi, theta = wanted[0], wanted[1]
             _aim(vector, here[2], free, over, slew.max_tilt_rad, here, wanted)
-            wanted_rate[:2] = (after - wanted[:2]) / interval_s
+            wanted_rate[0], wanted_rate[1] = (phi - wanted[0]) / interval_s, (theta - wanted[1]) / interval_s
         w, max_rate, max_acceleration = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
         for i in range(2):
             pull = 0.0 if kind == RATE else w * w * (wanted[i] - here[i])

@@ -88,7 +88,10 @@ def advance(
             _drive(motion, target[k], kinds, limits[0], wanted, snap)
             acceleration = _turn(yaw, rate, target_heading[k], turns, limits[0])
             if part == 0:
-                out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = p, v, a, j, snap
+                for i in range(3):
+                    out[4, k, i] = snap[i]
+                    for order in range(4):
+                        out[order, k, i] = motion[order, i]
                 out_heading[0, k], out_heading[1, k], out_heading[2, k] = yaw, rate, acceleration
             for i in range(3):
                 p[i] += step * (v[i] + step * (a[i] / 2.0 + step * (j[i] / 6.0 + step * snap[i] / 24.0)))

@@ -4,6 +4,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from importlib import import_module
 from threading import Event, Thread
 from time import perf_counter
 from typing import Any
@@ -51,7 +52,7 @@ def _compile(names: list[str], *, quiet: bool) -> None:
     from colibri.campaigns.engines import in_order
 
     with nullcontext() if quiet else _progress():
-        in_order(_fly, [name for name in names for _ in range(_SHARED_BY)], "compiling", quiet=True)
+        in_order(_fly, [(name, n) for name in names for n in range(_SHARED_BY)], "compiling", quiet=True)
 
 
 @contextmanager
@@ -75,16 +76,32 @@ def _progress() -> Iterator[None]:
         thread.join()
 
 
-def _fly(name: str) -> None:
+def _fly(job: tuple[str, int]) -> None:
+    """Fly `name`; the second process begins with matrices and the plant while the first compiles the law."""
     from colibri.common.machine_code.interpretation import interpret_while_waiting
 
     interpret_while_waiting()
+    name, number = job
     options = dict(FLIGHTS[name])
-    if not options.pop("sitl", False):
-        from colibri.experiments.flight import fly
-
-        fly("spiral", duration=1.6, **options)
+    if options.pop("sitl", False):
+        _fly_sitl()
         return
+    if number:
+        import_module("colibri.autopilot.control.parts.riccati")
+        _drop(options)
+    from colibri.experiments.flight import fly
+
+    fly("spiral", duration=1.6, **options)
+
+
+def _drop(options: dict[str, Any]) -> None:
+    from colibri.flights import FlightPlan, FlightSpec
+    from colibri.flights.in_process import plant_of
+
+    plant_of(FlightPlan.of(FlightSpec.of("spiral", **options)), 1000).go_on()
+
+
+def _fly_sitl() -> None:
     from colibri.sitl.backends.setting import Setting
     from colibri.sitl.session import Flights
 

@@ -65,6 +65,10 @@ def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages]
     """Build autopilot and plant; `clock` only measures."""
     estimator = estimator_for(plan.spec.feedback, plan.vehicle, DEFAULT_ORIGIN)
     autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.spec.law)
+    return autopilot, plant_of(plan, autopilot.frame_interval_us)
+
+
+def plant_of(plan: FlightPlan, interval_us: int) -> Plant:
     starts = {plan.spec.feedback: nudged(plan.start)}
     builder = PlantBuilder(plan.spec, plan.plant_vehicle, starts, integrator=plan.integrator)
-    return autopilot, builder.build(plan.spec.feedback, autopilot.frame_interval_us)
+    return builder.build(plan.spec.feedback, interval_us)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from colibri.autopilot.control.parts.policy_interface import aim, observe, take, turn
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled, without_gil
+from colibri.common.matrices import put
 from colibri.common.types import Array, Vector
 from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
@@ -124,11 +125,11 @@ def advance(
             for _ in range(substeps):
                 aim(x[n], action, mixers[n], scales[n], target)
                 runge_kutta_4(x[n], target, numbers, duration_s / substeps, 1, end)
-                x[n, :] = end
+                put(end, x[n])
         else:
             turn(action, scales[n], target)
             runge_kutta_4(x[n], target, numbers, duration_s, substeps, end)
-            x[n, :] = end
+            put(end, x[n])
         if not close_attitude(x[n]):
             ends[n], rewards[n] = NOT_FINITE, LOST
             continue

@@ -9,6 +9,7 @@ from math import inf, nan
 from typing import TypeAlias
 
 from colibri.common.jit import Packed, compiled
+from colibri.common.matrices import put
 from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import CHARGE
 from colibri.plant.physics.integrators import Integrator, adaptive_step, fixed_step
@@ -38,7 +39,7 @@ def fixed_frames(x: Array, target: PerRotor, parameters: Packed, time_us: int, i
         voltage_v, is_finite = fixed_step(x, target, parameters, interval_us * 1e-6, end)
         if not is_finite:
             return n
-        x[:] = end
+        put(end, x)
         time_us += interval_us
         _write(x, voltage_v, time_us, parameters, rows[n])
     return len(rows)
@@ -52,7 +53,7 @@ def adaptive_frames(x: Array, target: PerRotor, parameters: Packed, time_us: int
         voltage_v, is_finite = adaptive_step(x, target, parameters, interval_us * 1e-6, end)
         if not is_finite:
             return n
-        x[:] = end
+        put(end, x)
         time_us += interval_us
         _write(x, voltage_v, time_us, parameters, rows[n])
     return len(rows)

@@ -7,6 +7,7 @@ import numpy as np
 
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
+from colibri.common.matrices import put
 from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close, close_attitude, hold, write_derivative
 
@@ -98,8 +99,8 @@ def dormand_prince(
         error = _error(x, y, h, k)
         if error <= 1.0:
             gone_s += h
-            x[:] = y
-            k[0] = k[_STAGES - 1]
+            put(y, x)
+            put(k[_STAGES - 1], k[0])
             if gone_s >= duration_s:
                 return close(x, parameters), True
         elif not h > _TOO_SMALL * duration_s:

@@ -165,12 +165,12 @@ class LpvMpc(AttitudeController[LawMemory]):
         )
 
     def warm_up(self) -> None:
-        """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""
+        """Load compiled code by a step for an attitude, and three from hover, the last upside down."""
         memory, references = self.initial(self.tracker.vehicle.hover_speed), still_horizon(self.preview.samples)
-        for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
-            memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)
         level, _, _, _, _, no_thrust, _, _ = references
         self.step_attitude(memory, 0, AT_REST, AttitudeDemand(level, level, no_thrust))
+        for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
+            memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)
         self._mpc.warm_up()
 
     def initial(self, rotor_speed: float) -> LawMemory:
