@@ -167,8 +167,8 @@ def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bia
     x, y = _mean_felt(rows, first, len(rows) - 1, gravity)
     before_x, before_y = _mean_felt(rows, begin, last, gravity)
     x, y = x - before_x, y - before_y
-    size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
-    return sqrt((x - bias[0]) ** 2 + (y - bias[1]) ** 2) <= _ALIKE_PART * max(sqrt(x**2 + y**2), size)
+    felt, size = sqrt(x**2 + y**2), sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
+    return sqrt((x - bias[0]) ** 2 + (y - bias[1]) ** 2) <= _ALIKE_PART * max(felt, size)
 
 
 @compiled

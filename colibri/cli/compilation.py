@@ -88,13 +88,13 @@ def _fly(job: tuple[str, int]) -> None:
         return
     if number:
         import_module("colibri.autopilot.control.parts.riccati")
-        _drop(options)
+        _fly_plant(options)
     from colibri.experiments.flight import fly
 
     fly("spiral", duration=1.6, **options)
 
 
-def _drop(options: dict[str, Any]) -> None:
+def _fly_plant(options: dict[str, Any]) -> None:
     from colibri.flights import FlightPlan, FlightSpec
     from colibri.flights.in_process import plant_of
 

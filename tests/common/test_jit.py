@@ -22,6 +22,7 @@ from colibri.common.machine_code import on_disk
 from colibri.common.machine_code.content import fields_of, functions_of, key_of
 from colibri.common.machine_code.interpretation import interpret_while_waiting
 from colibri.common.machine_code.turns import Turn
+from colibri.experiments.flight import fly
 
 MODULES = [
     importlib.import_module(entry.name)
@@ -75,6 +76,15 @@ def test_kernels_are_exact_and_cached_on_disk(kernel: Dispatcher) -> None:
     assert kernel.stats.cache_path is not None
     named = [kernel.py_func.__globals__.get(name) for name in kernel.py_func.__code__.co_names]
     assert {it.__name__ for it in named if isinstance(it, ModuleType)} <= {"numpy"}
+
+
+def test_no_kernel_assigns_whole_arrays() -> None:
+    """`out[:] = values` takes seconds to compile, most for the text of an error of shapes: see `matrices.put`."""
+    fly("spiral", feedback="sensors", turbulence="light", duration=3.0)
+    flown: list[tuple[str, Any]] = [(name, it) for name, kernel in KERNELS.items() for it in kernel.overloads.values()]
+    codes = {name: made.library._get_module_for_linking().as_bitcode() for name, made in flown}  # noqa: SLF001
+    assert {"colibri.plant.physics.frames.fixed_frames", "colibri.autopilot.estimation.eskf_predict.predict"} < {*codes}
+    assert [name for name, code in codes.items() if b"raise_with_shape_context" in code] == []
 
 
 def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
